@@ -57,6 +57,8 @@ OLBVH_BUFFER(9, 16, uvec4, neighbours)
 OLBVH_BUFFER(10, 4, float, field)
 uint LISTS;
 
+vec4 knot(uint i) { return grid.at[0].knots[i]; }
+vec4 rate(uint i) { return grid.at[0].rates[i]; }
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/node.glsl"

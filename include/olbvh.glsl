@@ -56,7 +56,10 @@ struct olbvh_Grid {
     uint ids;     // Bits of an entry of P that hold its tetrahedron; the bits above are its quarters, if there are any.
     uint slabs;   // Word of PO where the slabs of the leaves begin; 0: there are none.
     uint longest; // Entries of the longest leaf.
-    uint pad[2];  // Unused.
+    uint graded;  // Not 0: cells are smaller where the mesh has more tetrahedra, see src/mesh/grading.rs.
+    uint pad;     // Unused.
+    vec4 knots[17]; // If it is graded: where the stretches of each axis begin, as distances from `lo`, and the extent.
+    vec4 rates[16]; // If it is graded: finest cells per unit of length in each stretch, 0 on a flat axis.
 };
 
 // Device addresses of a mesh and its tree, for the shaders of other programs, low word first. See src/glsl.rs.
@@ -88,9 +91,14 @@ OLBVH_BUFFER(9, 16, uvec4, olbvh_neighbours)
 OLBVH_BUFFER(10, 4, float, olbvh_field)
 uint olbvh_LISTS;
 
+vec4 olbvh_knot(uint i) { return olbvh_grid.at[0].knots[i]; }
+vec4 olbvh_rate(uint i) { return olbvh_grid.at[0].rates[i]; }
 // Quantization and Morton codes (SPEC 2.1). Twin of src/grid.rs; the operations and their order are the same.
 
 const uint olbvh_MAX_LEVEL = 10u; // Level of the finest grid, and number of bits per axis of its 32-bit Morton codes.
+
+const uint olbvh_STRETCHES = 16u;      // Of an axis of a graded grid: intervals with equally many cells, each as wide.
+const uint olbvh_STRETCH_CELLS = 64u;  // Cells of the finest grid in a stretch.
 
 float olbvh_two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
 
@@ -118,6 +126,32 @@ bool olbvh_near_bounds(olbvh_Grid g, vec3 x) {
     return finite && all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
 }
 
+// The arrays of a graded grid. They are read from memory where they are needed, since few grids are graded; whoever
+// includes this file defines them.
+vec4 olbvh_knot(uint i);
+vec4 olbvh_rate(uint i);
+
+// Distance from the lower corner in cells of the finest grid, monotone, and in a graded grid in [0, 1024].
+vec3 olbvh_in_cells(olbvh_Grid g, vec3 d) {
+    precise vec3 q = d * g.inv.xyz;
+    if (g.graded == 0u) return q;
+    precise vec3 sum = vec3(0.0);
+    for (uint i = 0u; i < olbvh_STRETCHES; ++i) {
+        precise vec3 part = (d - olbvh_knot(i).xyz) * olbvh_rate(i).xyz;
+        sum = sum + clamp(part, vec3(0.0), vec3(float(olbvh_STRETCH_CELLS)));
+    }
+    return sum;
+}
+
+// Where the lower side of a cell of the finest grid is in a graded grid: its distance from the lower corner.
+float olbvh_graded_side(uint c, uint k) {
+    uint i = min(k / olbvh_STRETCH_CELLS, olbvh_STRETCHES - 1u);
+    float from = olbvh_knot(i)[c];
+    precise float width = (olbvh_knot(i + 1u)[c] - from) * olbvh_two_to(-6);
+    precise float at = from + width * float(k - i * olbvh_STRETCH_CELLS);
+    return at;
+}
+
 // The cell of the finest grid at this distance from the lower corner, in cells of that grid, clamped into the grid.
 uvec3 olbvh_cell_at(vec3 q) {
     vec3 r = clamp(q, vec3(0.0), vec3(1023.0));
@@ -126,8 +160,7 @@ uvec3 olbvh_cell_at(vec3 q) {
 
 // The cell of the finest grid that contains a point, clamped into the grid.
 uvec3 olbvh_quantize(olbvh_Grid g, vec3 x) {
-    precise vec3 q = olbvh_from_corner(g, x) * g.inv.xyz;
-    return olbvh_cell_at(q);
+    return olbvh_cell_at(olbvh_in_cells(g, olbvh_from_corner(g, x)));
 }
 
 // Words of one bit for each cell of a level.
@@ -508,17 +541,21 @@ struct olbvh_Sought {
 };
 
 // How many finest cells a box grows by on every side so that it contains all points that its tetrahedron may own.
-uint olbvh_cells_beyond(float tolerance) { return 1u + olbvh_whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0); }
+// Those of a graded grid may be 64 times as small.
+uint olbvh_cells_beyond(olbvh_Grid g, float tolerance) {
+    precise float olbvh_cells = clamp(tolerance, 0.0, 1.0) * (g.graded == 0u ? 4096.0 : 262144.0);
+    return 1u + olbvh_whole_of(olbvh_cells);
+}
 
 // Whether quarters and slabs leave room for a tolerance.
-bool olbvh_leaves_room(float tolerance) { return olbvh_cells_beyond(tolerance) == 1u; }
+bool olbvh_leaves_room(olbvh_Grid g, float tolerance) { return olbvh_cells_beyond(g, tolerance) == 1u; }
 
 // The point `at`, in the units of the mesh. A point with barycentric coordinates of at least -t lies outside of the
 // tetrahedron's box by at most 3 t times the size of the box.
 olbvh_Sought olbvh_sought_at(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
     uvec3 cell = olbvh_quantize(g, at);
-    uvec3 reach = olbvh_reach_of(g, olbvh_cells_beyond(tolerance));
-    return olbvh_Sought(x, cell - min(cell, reach), cell + reach, olbvh_leaves_room(tolerance) ? olbvh_quarters_around(g, cell) : 0u);
+    uvec3 reach = olbvh_reach_of(g, olbvh_cells_beyond(g, tolerance));
+    return olbvh_Sought(x, cell - min(cell, reach), cell + reach, olbvh_leaves_room(g, tolerance) ? olbvh_quarters_around(g, cell) : 0u);
 }
 
 // Whether a tetrahedron's quantized box is near enough for it to own the point. This reads one word per vertex, its
@@ -556,16 +593,37 @@ void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights 
 // Slabs: two parallel planes per leaf between which all tetrahedra of its list lie. Twin of src/reference/slabs.rs, which
 // explains them; the operations and their order are the same. Needs grid.glsl and tet.glsl.
 // Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in
-// src/reference/assign.rs.
+// src/reference/assign.rs. Needs grid.glsl.
 
-vec3 olbvh_half_cell(olbvh_Grid g, uint level) {
-    precise vec3 cell = g.extent.xyz * olbvh_two_to(-1 - int(level));
-    precise vec3 whole = g.extent.xyz * 0.5;
-    return vec3(g.inv.x == 0.0 ? whole.x : cell.x, g.inv.y == 0.0 ? whole.y : cell.y, g.inv.z == 0.0 ? whole.z : cell.z);
+// The lower side of a cell of the finest grid, if the grid is graded.
+float olbvh_normalised_side(olbvh_Grid g, uint c, uint k) {
+    precise float unit = olbvh_graded_side(c, k) * g.scale;
+    precise float whole = floor(olbvh_canonical(unit) * olbvh_two_to(82)) * olbvh_two_to(-42);
+    return whole;
 }
 
-vec3 olbvh_cell_centre(vec3 h, uvec3 cell) {
+// Half the size of a cell of a level; in grids that are not graded, all of a level have the same.
+vec3 olbvh_half_cell(olbvh_Grid g, uint level, uvec3 cell) {
+    precise vec3 part = g.extent.xyz * olbvh_two_to(-1 - int(level));
+    precise vec3 whole = g.extent.xyz * 0.5;
+    vec3 h = vec3(g.inv.x == 0.0 ? whole.x : part.x, g.inv.y == 0.0 ? whole.y : part.y, g.inv.z == 0.0 ? whole.z : part.z);
+    if (g.graded == 0u) return h;
+    for (uint c = 0u; c < 3u; ++c) {
+        if (g.inv[c] == 0.0) continue;
+        uint shift = olbvh_MAX_LEVEL - level;
+        precise float size = olbvh_normalised_side(g, c, (cell[c] + 1u) << shift) - olbvh_normalised_side(g, c, cell[c] << shift);
+        h[c] = size * 0.5;
+    }
+    return h;
+}
+
+// The centre of a cell of a level, with its half size.
+vec3 olbvh_cell_centre(olbvh_Grid g, uint level, vec3 h, uvec3 cell) {
     precise vec3 a = vec3(2u * cell + 1u) * h;
+    for (uint c = 0u; c < 3u && g.graded != 0u; ++c) {
+        precise float middle = olbvh_normalised_side(g, c, cell[c] << (olbvh_MAX_LEVEL - level)) + h[c];
+        if (g.inv[c] != 0.0) a[c] = middle;
+    }
     precise vec3 b = floor(a * olbvh_two_to(42)) * olbvh_two_to(-42);
     return b;
 }
@@ -578,14 +636,14 @@ struct olbvh_SlabCell {
     vec3 inverse;
 };
 
-// Reciprocals of the half sizes of a leaf's cell, 0 on axes that normalised coordinates are too coarse for.
+// Reciprocals of the half sizes of a leaf's cell (leaves of a graded grid have no slabs), 0 on axes that normalised coordinates are too coarse for.
 vec3 olbvh_slab_scale(olbvh_Grid g) {
-    vec3 h = olbvh_half_cell(g, g.level), r;
+    vec3 h = olbvh_half_cell(g, g.level, uvec3(0u)), r;
     for (uint c = 0u; c < 3u; ++c) r[c] = g.extent[c] < olbvh_two_to(-30) ? 0.0 : olbvh_reciprocal(h[c]);
     return r;
 }
 
-olbvh_SlabCell olbvh_slab_cell(olbvh_Grid g, vec3 scale, uvec3 cell) { return olbvh_SlabCell(olbvh_cell_centre(olbvh_half_cell(g, g.level), cell), scale); }
+olbvh_SlabCell olbvh_slab_cell(olbvh_Grid g, vec3 scale, uvec3 cell) { return olbvh_SlabCell(olbvh_cell_centre(g, g.level, olbvh_half_cell(g, g.level, cell), cell), scale); }
 
 vec3 olbvh_in_cell(olbvh_SlabCell cell, vec3 x) {
     precise vec3 y = (x - cell.centre) * cell.inverse;
@@ -656,7 +714,7 @@ uint olbvh_leaf_to_search(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
     if (!olbvh_near_bounds(g, at)) return olbvh_NONE;
     uvec3 finest = olbvh_quantize(g, at);
     uint leaf = olbvh_find_leaf(g.level, finest);
-    return leaf == olbvh_NONE || (olbvh_leaves_room(tolerance) && olbvh_side_of_slab(g, olbvh_slab_scale(g), leaf, finest, x) != 0) ? olbvh_NONE : leaf;
+    return leaf == olbvh_NONE || (olbvh_leaves_room(g, tolerance) && olbvh_side_of_slab(g, olbvh_slab_scale(g), leaf, finest, x) != 0) ? olbvh_NONE : leaf;
 }
 
 // The owner, once the whole list has been searched; NONE if there is none.
@@ -977,8 +1035,9 @@ uint olbvh_middle_of(uvec2 range) { return olbvh_listed_tet(range.x + (range.y -
 // The owner of the point `at`, x in normalised coordinates, in a leaf that is full of mesh, found by a whole walk.
 olbvh_Best olbvh_walked_through(olbvh_Grid g, uvec2 range, vec3 at, vec3 x) {
     olbvh_LeafCell cell;
-    cell.half_size = olbvh_half_cell(g, g.level);
-    cell.centre = olbvh_cell_centre(cell.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
+    uvec3 of_leaf = olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level);
+    cell.half_size = olbvh_half_cell(g, g.level, of_leaf);
+    cell.centre = olbvh_cell_centre(g, g.level, cell.half_size, of_leaf);
     return olbvh_walk_from_seed(olbvh_listed_tet(range.x), cell, x);
 }
 
@@ -1217,6 +1276,7 @@ float olbvh_cell_side(olbvh_Grid g, uint c, uint level, uint k) {
     precise float extent = g.hi[c] - g.lo[c];
     precise float along = float(k) * olbvh_two_to(-int(level));
     precise float offset = olbvh_canonical(extent) * along;
+    if (g.graded != 0u) offset = olbvh_graded_side(c, k << (olbvh_MAX_LEVEL - level));
     precise float x = g.lo[c] + offset;
     return olbvh_canonical(x);
 }

@@ -6,7 +6,7 @@
 use crate::layout::constants::check_cells::LIMIT;
 
 pub use crate::layout::Grid;
-pub use crate::layout::constants::grid::MAX_LEVEL;
+pub use crate::layout::constants::grid::{MAX_LEVEL, STRETCH_CELLS, STRETCHES};
 
 /// 2^n for |n| ≤ 126.
 pub(crate) const fn two_to(n: i32) -> f32 {
@@ -53,9 +53,27 @@ impl Grid {
     /// The cell of the finest grid that contains `x`; points outside the grid are clamped to it.
     pub fn quantize(&self, x: [f32; 3]) -> [u32; 3] {
         per_axis(|c| {
-            let q = (canonical(canonical(x[c]) - self.lo[c]) * self.inv[c]).floor();
+            let q = self.in_cells(c, canonical(canonical(x[c]) - self.lo[c])).floor();
             q.clamp(0.0, 1023.0) as u32
         })
+    }
+
+    /// The distance `d` from the lower corner along axis `c`, in cells of the finest grid. It is monotone, and in a
+    /// graded grid in [0, 1024].
+    pub fn in_cells(&self, c: usize, d: f32) -> f32 {
+        if self.graded == 0 {
+            return d * self.inv[c];
+        }
+        let in_stretch = |(from, rate): (&[f32; 4], &[f32; 4])| ((d - from[c]) * rate[c]).clamp(0.0, STRETCH_CELLS as f32);
+        self.knots.iter().zip(&self.rates).map(in_stretch).fold(0.0, |sum, cells| sum + cells)
+    }
+
+    /// Where the lower side of cell `k` of the finest grid is along axis `c`, if the grid is graded: its distance from the
+    /// lower corner.
+    pub fn graded_side(&self, c: usize, k: u32) -> f32 {
+        let i = (k / STRETCH_CELLS).min(STRETCHES - 1);
+        let [from, to] = [i, i + 1].map(|i| self.knots[i as usize][c]);
+        from + ((to - from) * two_to(-6)) * (k - i * STRETCH_CELLS) as f32
     }
 
     /// `x` in normalised coordinates, in which the lower corner of the bounds is at 0 and the largest extent is in

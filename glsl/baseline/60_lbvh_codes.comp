@@ -8,7 +8,7 @@ ARGUMENTS(6)
     uint tets;
     uint stride;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER(1, readonly, float, positions)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)

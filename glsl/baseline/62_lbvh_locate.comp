@@ -11,7 +11,7 @@ ARGUMENTS(11)
     uint budget; // nodes and tetrahedra per point and dispatch
     float tolerance;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER16(1, readonly, LbvhNode, nodes)
 BUFFER(2, readonly, uint, root)
 BUFFER(3, readonly, uint, ids)

@@ -14,7 +14,7 @@ ARGUMENTS(14)
     uint tets;
     uint budget; // nodes and tests per tetrahedron and dispatch
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid) // of the other mesh, like all up to `positions`
+GRID(0, readonly) // of the other mesh, like all up to `positions`
 BUFFER16(1, readonly, LbvhNode, nodes)
 BUFFER(2, readonly, uint, root)
 BUFFER(3, readonly, uint, ids)

@@ -9,7 +9,7 @@ ARGUMENTS(8)
     uint count;
     uint stride;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 ALIGNED_BUFFER(8, 1, readonly, uvec2, sides)
 BUFFER(2, readonly, uint, longest)
 RECORDS(3, uvec4, cells)

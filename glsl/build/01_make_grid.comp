@@ -1,13 +1,29 @@
 #version 460
 // Makes the grid from the bounds (SPEC 2.1). Where the host divides floats, this kernel divides integers, since
-// Vulkan's division is not correctly rounded.
+// Vulkan's division is not correctly rounded. Where most of the tetrahedra lie in a small part of an axis, the grid is
+// graded, by quantiles of a sample. One workgroup. Twin of src/mesh/grading.rs, which explains it.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/ordered.glsl"
-NO_SCALARS(2)
+ARGUMENTS(5)
+    uint tets;
+    uint stride; // floats from one point to the next
+END_ARGUMENTS
 BUFFER(0, readonly, MeshStatus, status)
 BUFFER16(1, writeonly, Grid, grid)
+BUFFER(2, readonly, float, positions)
+RECORDS(3, uvec4, cells)
+BUFFER(4, readonly, uint, bad)
+#include "shared/positions.glsl"
+#include "shared/bad.glsl"
+
+const uint SAMPLES = 256u; // Tetrahedra that are looked at.
+const uint PLACES = 2u * SAMPLES; // As many even places as those of tetrahedra.
+const float NOWHERE = 3.40282347e38;
+
+shared float places[3][PLACES]; // distances from the lower corner, NOWHERE for a bad tetrahedron
+shared float quantiles[3][STRETCHES];
 
 float from_ordered(uint key) { return uintBitsToFloat(unordered(key)); }
 
@@ -36,23 +52,103 @@ float divide_1024(float e) {
     return uintBitsToFloat((uint(scale) << 23) + (quotient - 0x00800000u));
 }
 
+// Distance from the lower corner of a place of sample k within its tetrahedron, along one axis.
+float place_of(uint k, vec4 corners, float lo) {
+    float a = canonical(corners.x), b = canonical(corners.y), c = canonical(corners.z), d = canonical(corners.w);
+    float least = min(min(a, b), min(c, d)), most = max(max(a, b), max(c, d));
+    precise float part = float(k * 0x9e3779b9u >> 8) * two_to(-24);
+    precise float at = least + canonical(most - least) * part;
+    precise float away = canonical(at) - lo;
+    return max(canonical(away), 0.0);
+}
+
+// Twin of `hash` in src/mesh/kuhn.rs.
+uint hash(uint x) {
+    x = (x ^ x >> 16) * 0x7feb352du;
+    x = (x ^ x >> 15) * 0x846ca68bu;
+    return x ^ x >> 16;
+}
+
+void take_sample(uint k, vec3 lo, vec3 extent) {
+    uint each = tets / SAMPLES;
+    uint t = k * each + k * (tets % SAMPLES) / SAMPLES + (each == 0u ? 0u : hash(k) % each);
+    bool ok = !is_bad(t);
+    vec3 v[4];
+    uvec4 ids = ok ? words(cells.at[t]) : uvec4(0u);
+    for (uint i = 0u; i < 4u && ok; ++i) v[i] = position(ids[i], stride);
+    for (uint c = 0u; c < 3u; ++c) {
+        places[c][2u * k] = ok ? place_of(k, vec4(v[0][c], v[1][c], v[2][c], v[3][c]), lo[c]) : NOWHERE;
+        precise float even = extent[c] * (float(k) * two_to(-8));
+        places[c][2u * k + 1u] = even;
+    }
+}
+
+// Finds the quantiles that place k is.
+void rank_place(uint k) {
+    for (uint c = 0u; c < 3u; ++c) {
+        float own = places[c][k];
+        uint rank = 0u, valid = 0u;
+        for (uint i = 0u; i < PLACES; ++i) {
+            float other = places[c][i];
+            rank += uint(other < own || (other == own && i < k));
+            valid += uint(other < NOWHERE);
+        }
+        for (uint j = 1u; j < STRETCHES; ++j) {
+            if (own < NOWHERE && rank == j * valid / STRETCHES) quantiles[c][j] = own;
+        }
+    }
+}
+
+float quantile(uint c, uint j, float extent) { return j == 0u ? 0.0 : j == STRETCHES ? extent : min(quantiles[c][j], extent); }
+
+// Whether a quarter of the stretches between quantiles are less than a quarter as wide as even ones.
+bool is_steep(uint c, float extent) {
+    precise float narrow = extent * two_to(-6);
+    uint count = 0u;
+    for (uint j = 0u; j < STRETCHES; ++j) {
+        precise float width = quantile(c, j + 1u, extent) - quantile(c, j, extent);
+        count += uint(width < narrow);
+    }
+    return 4u * count >= STRETCHES;
+}
+
+// Where stretch j begins: at the quantile, moved a little to where it would be in a grid that is not graded.
+float knot_at(uint c, uint j, float extent, bool steep) {
+    precise float even = extent * (float(j) * two_to(-4));
+    precise float part = quantile(c, j, extent) * (1.0 - two_to(-6));
+    precise float moved = part + even * two_to(-6);
+    return j == STRETCHES ? extent : steep ? moved : even;
+}
+
 void main() {
-    if (item_index() > 0u) return;
-    Grid g;
-    g.lo = vec4(0.0);
-    g.hi = vec4(0.0);
-    g.inv = vec4(0.0);
-    g.extent = vec4(0.0);
-    const float MIN_EXTENT = uintBitsToFloat((127u - 103u) << 23);
-    float largest = MIN_EXTENT;
+    vec3 lo = vec3(0.0), hi = vec3(0.0), extent = vec3(0.0);
     bool any_cell = status.at[0].hi[0] != 0u;
     for (uint c = 0u; any_cell && c < 3u; ++c) {
-        g.lo[c] = from_ordered(~status.at[0].lo[c]);
-        g.hi[c] = from_ordered(status.at[0].hi[c]);
-        precise float d = g.hi[c] - g.lo[c];
-        float e = canonical(d);
-        largest = max(largest, e);
-        g.inv[c] = e < MIN_EXTENT ? 0.0 : divide_1024(e);
+        lo[c] = from_ordered(~status.at[0].lo[c]);
+        hi[c] = from_ordered(status.at[0].hi[c]);
+        precise float d = hi[c] - lo[c];
+        extent[c] = canonical(d);
+    }
+    for (uint k = local_index(); any_cell && k < SAMPLES; k += WORKGROUP) take_sample(k, lo, extent);
+    barrier();
+    for (uint k = local_index(); any_cell && k < PLACES; k += WORKGROUP) rank_place(k);
+    barrier();
+    if (local_index() > 0u) return;
+    Grid g;
+    g.lo = vec4(lo, 0.0);
+    g.hi = vec4(hi, 0.0);
+    g.inv = vec4(0.0);
+    g.extent = vec4(0.0);
+    g.graded = 0u;
+    const float MIN_EXTENT = uintBitsToFloat((127u - 103u) << 23);
+    float largest = MIN_EXTENT;
+    bvec3 steep = bvec3(false);
+    for (uint c = 0u; any_cell && c < 3u; ++c) {
+        largest = max(largest, extent[c]);
+        if (extent[c] < MIN_EXTENT) continue;
+        g.inv[c] = divide_1024(extent[c]);
+        steep[c] = is_steep(c, extent[c]);
+        g.graded |= uint(steep[c]);
     }
     uint exponent = floatBitsToUint(largest) >> 23;
     g.scale = uintBitsToFloat((254u - exponent) << 23);
@@ -60,8 +156,19 @@ void main() {
     g.first_leaf = 0u;
     g.slabs = 0u;
     g.longest = 0u;
-    g.pad = uint[2](0u, 0u);
+    g.pad = 0u;
     g.ids = NONE;
     g.extent = vec4(normalise(g, g.hi.xyz), 0.0);
+    for (uint j = 0u; j <= STRETCHES; ++j) g.knots[j] = vec4(0.0);
+    for (uint j = 0u; j < STRETCHES; ++j) g.rates[j] = vec4(0.0);
+    for (uint c = 0u; c < 3u && g.graded != 0u; ++c) {
+        if (g.inv[c] == 0.0) continue;
+        for (uint j = 0u; j <= STRETCHES; ++j) g.knots[j][c] = knot_at(c, j, extent[c], steep[c]);
+        for (uint j = 0u; j < STRETCHES; ++j) {
+            precise float width = g.knots[j + 1u][c] - g.knots[j][c];
+            precise float rate = divide_1024(width) * two_to(-4); // STRETCH_CELLS / width
+            g.rates[j][c] = rate;
+        }
+    }
     grid.at[0] = g;
 }

@@ -8,7 +8,7 @@ ARGUMENTS(3)
     uint points;
     uint stride; // floats from one point to the next
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER(1, readonly, float, positions)
 BUFFER16(2, writeonly, uvec4, vertices)
 #include "shared/positions.glsl"

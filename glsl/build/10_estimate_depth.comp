@@ -10,7 +10,7 @@ ARGUMENTS(5)
     uint stride;
     uint tile; // tetrahedra per workgroup
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER(1, readonly, float, positions)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
@@ -45,7 +45,9 @@ void main() {
         lo = vec3(canonical(lo.x), canonical(lo.y), canonical(lo.z));
         hi = vec3(canonical(hi.x), canonical(hi.y), canonical(hi.z));
         precise vec3 size = hi - lo;
-        precise vec3 extent = floor(vec3(canonical(size.x), canonical(size.y), canonical(size.z)) * g.inv.xyz);
+        precise vec3 extent = vec3(canonical(size.x), canonical(size.y), canonical(size.z)) * g.inv.xyz;
+        if (g.graded != 0u) extent = in_cells(g, from_corner(g, hi)) - in_cells(g, from_corner(g, lo));
+        extent = floor(extent);
         float largest = min(max(max(extent.x, extent.y), extent.z), 1024.0);
         sums[0].x += max(floatBitsToUint(largest) >> 23, 127u) - 127u; // its base-2 logarithm, rounded down, at least 0
         // Since quantization is monotone, these are the corners of the box of the vertices' cells.

@@ -12,7 +12,7 @@ layout(constant_id = 3) const uint CLEAR = 0;
 ARGUMENTS(7)
     uint tets;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 RECORDS(1, vec4, vertices)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)

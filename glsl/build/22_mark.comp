@@ -12,7 +12,7 @@ ARGUMENTS(8)
     uint tets;
     uint capacity; // most shares
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 RECORDS(1, vec4, vertices)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
@@ -35,13 +35,13 @@ void mark_word(uint word, uint bits) {
 void mark(Grid g, uint t, uint first) {
     CellBox box = coarser(finest_box(t), g.level);
     uvec3 at = first_candidate(box, first);
-    Filter cell_filter;
-    if (ASSIGN != 0u) cell_filter = make_filter(load_tet(words(cells.at[t])), g, g.level, ASSIGN);
+    Tet tet;
+    if (ASSIGN != 0u) tet = load_tet(words(cells.at[t]));
     uint run;
     for (uint n = candidates_of(box, first); n > 0u; n -= run) {
         run = min(n, box.lo.x + box.size.x - at.x);
         uint row = low_bits(run);
-        if (ASSIGN != 0u) row = touching(cell_filter, box, at, row);
+        if (ASSIGN != 0u) row = touching(tet, g, ASSIGN, box, at, row);
         uint place = mark_place(g.level, at), shift = place & 31u;
         mark_word(place >> 5u, row << shift);
         if (shift + run > 32u) mark_word((place >> 5u) + 1u, row >> (32u - shift));

@@ -14,7 +14,7 @@ ARGUMENTS(12)
     uint tets;
     uint capacity; // most shares
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 RECORDS(1, vec4, vertices)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
@@ -50,21 +50,20 @@ void main() {
     }
     uvec3 at = first_candidate(box, share.first);
     Tet tet = load_tet(words(cells.at[t]));
-    vec3 h = half_cell(g, g.level);
     uint bits = low_bits(n), centres = 0u;
     if (LISTS != 0u) {
-        sift(g.level, box, at, n, centres_of(tet, h, box), bits, centres);
+        sift(g.level, box, at, n, centres_of(tet, g, box), bits, centres);
         if (is_boundary_tet(t)) centres = 0u;
     }
     // Inside the mesh no candidate is marked, and no planes need to be made.
-    if (ASSIGN != 0u && bits != 0u) bits = touching(make_filter(tet, g, g.level, ASSIGN), box, at, bits);
+    if (ASSIGN != 0u && bits != 0u) bits = touching(tet, g, ASSIGN, box, at, bits);
     bool doubt = false;
     uint i = 0u;
     for (; centres != 0u; centres &= centres - 1u) {
         uint next = uint(findLSB(centres));
         at = advance(box, at, next - i);
         i = next;
-        Weights own = weights(tet, cell_centre(h, at));
+        Weights own = weights(tet, centre_of(g, at));
         if (own.clear) bits |= 1u << i;
         doubt = doubt || in_doubt(own);
     }

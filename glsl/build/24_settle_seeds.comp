@@ -10,7 +10,7 @@ ARGUMENTS(12)
     uint tets;
     uint capacity; // most shares
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 RECORDS(1, vec4, vertices)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
@@ -55,14 +55,13 @@ void main() {
     CellBox box = coarser(finest_box(share.t), g.level);
     uvec3 at = first_candidate(box, share.first);
     Tet tet = load_tet(words(cells.at[share.t]));
-    vec3 h = half_cell(g, g.level);
     uint marked, centres, bits = hits.at[share.index], i = 0u;
-    sift(g.level, box, at, candidates_of(box, share.first), centres_of(tet, h, box), marked, centres);
+    sift(g.level, box, at, candidates_of(box, share.first), centres_of(tet, g, box), marked, centres);
     for (centres &= ~bits; centres != 0u; centres &= centres - 1u) {
         uint next = uint(findLSB(centres));
         at = advance(box, at, next - i);
         i = next;
-        vec3 centre = cell_centre(h, at);
+        vec3 centre = centre_of(g, at);
         Weights own = weights(tet, centre);
         if (in_doubt(own) && owns_centre(share.t, own, centre)) bits |= 1u << i;
     }

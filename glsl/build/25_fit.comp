@@ -11,7 +11,7 @@ ARGUMENTS(8)
     uint capacity; // most entries
     uint first;    // not 0: no attempt has been made yet
 END_ARGUMENTS
-BUFFER16(0, READ_WRITE, Grid, grid)
+GRID(0, READ_WRITE)
 BUFFER(1, READ_WRITE, BuildStatus, status)
 BUFFER(2, writeonly, uint, shares)  // number of shares at the level that was filtered last
 BUFFER(3, READ_WRITE, uint, entries) // number of entries at that level

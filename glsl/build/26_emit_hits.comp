@@ -8,7 +8,7 @@ ARGUMENTS(10)
     uint capacity; // most shares
     uint room;     // most entries
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 RECORDS(1, vec4, vertices)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)

@@ -6,7 +6,7 @@
 ARGUMENTS(4)
     uint capacity;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER(1, readonly, uint, entries)
 BUFFER(2, readonly, uint, codes)
 BUFFER(3, writeonly, uint, counts)

@@ -12,7 +12,7 @@ ARGUMENTS(7)
     uint nodes;    // capacity of the node arrays
     uint run;      // codes per run
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER(1, readonly, uint, entries)
 BUFFER(2, readonly, uint, places)          // scanned table of splits
 BUFFER(3, writeonly, uint, table_length)   // length of the table of splits

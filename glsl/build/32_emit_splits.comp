@@ -10,7 +10,7 @@ ARGUMENTS(7)
     uint id_mask; // bits of an entry of P that hold its tetrahedron
     uint slabs;   // not 0: leaves have slabs, behind PO
 END_ARGUMENTS
-BUFFER16(0, READ_WRITE, Grid, grid)
+GRID(0, READ_WRITE)
 BUFFER(1, readonly, uint, entries)
 BUFFER(2, readonly, uint, codes)
 BUFFER(3, readonly, uint, places)
@@ -26,7 +26,7 @@ void main() {
     uint first_leaf = status.at[0].internal;
     if (run == 0u) {
         grid.at[0].first_leaf = first_leaf;
-        grid.at[0].ids = id_mask;
+        grid.at[0].ids = grid.at[0].graded == 0u ? id_mask : NONE; // quarters are of cells of equal size
         grid.at[0].slabs = slabs == 0u ? 0u : status.at[0].leaves + 1u;
         po.at[0] = 0u;
         co.at[0] = 0u;

@@ -8,7 +8,7 @@ ARGUMENTS(7)
     uint capacity;
 END_ARGUMENTS
 BUFFER(0, readonly, uint, entries)
-BUFFER16(1, readonly, Grid, grid)
+GRID(1, readonly)
 BUFFER(2, readonly, BuildStatus, status)
 BUFFER(3, readonly, uint, codes)
 RECORDS(4, uvec4, cells)

@@ -13,7 +13,7 @@
 layout(constant_id = 2) const uint BOXES = 0;
 layout(constant_id = 3) const uint MARKED = 0;
 NO_SCALARS(11)
-BUFFER16(0, READ_WRITE, Grid, grid)
+GRID(0, READ_WRITE)
 BUFFER(1, readonly, uint, codes)
 BUFFER(2, readonly, uint, po)
 BUFFER(3, READ_WRITE, uint, flags)
@@ -33,7 +33,8 @@ const uint MAX_LIST_FOR_OCTANTS = 16384u; // Leaves with longer lists get a mask
 
 // Whether one of the first MAX_TOUCH_TESTS tetrahedra of a leaf touches its cell.
 bool touched(Grid g, uint begin, uint end, uint code) {
-    vec3 h = half_cell(g, g.level), centre = cell_centre(h, unmorton(code));
+    uvec3 cell = unmorton(code);
+    vec3 h = half_cell(g, g.level, cell), centre = cell_centre(g, g.level, h, cell);
     vec3 axes[3] = vec3[3](vec3(h.x, 0.0, 0.0), vec3(0.0, h.y, 0.0), vec3(0.0, 0.0, h.z));
     for (uint i = begin; i < min(end, begin + MAX_TOUCH_TESTS); ++i) {
         uvec4 ids = words(cells.at[p.at[i]]);

@@ -5,7 +5,7 @@
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 NO_SCALARS(9)
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER(1, readonly, BuildStatus, status)
 BUFFER(2, readonly, uint, codes)
 BUFFER(3, READ_WRITE, uint, po)
@@ -126,7 +126,7 @@ void main() {
         end = po.at[i + 1u];
         code = end > begin ? codes.at[end - 1u] : 0u;
     }
-    bool asks = begin < end && end - begin <= MAX_LIST_FOR_SLAB;
+    bool asks = begin < end && end - begin <= MAX_LIST_FOR_SLAB && g.graded == 0u;
     while (subgroupAny(asks)) {
         bool turn = gl_SubgroupInvocationID == subgroupMin(asks ? gl_SubgroupInvocationID : NONE);
         uint of_leaf = fitted(g, subgroupMax(turn ? begin : 0u), subgroupMax(turn ? end : 0u), subgroupMax(turn ? code : 0u));

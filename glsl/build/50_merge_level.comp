@@ -9,7 +9,7 @@ layout(constant_id = 2) const uint BOXES = 0;
 ARGUMENTS(8)
     uint level;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER(1, readonly, BuildStatus, status)
 BUFFER(2, readonly, uint, codes)
 BUFFER(3, readonly, uint, po)

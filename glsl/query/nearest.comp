@@ -41,8 +41,10 @@ vec3 x; // the point in normalised coordinates
 // its cell contains: it is reduced by about 2^-19 of the bounds per axis. Cells are those in normalised coordinates, by
 // which tetrahedra are assigned, since their sides in units of the mesh are rounded by more where that is far from 0.
 float node_square(Node node) {
-    vec3 h = half_cell(grid.at[0], node.level);
-    precise vec3 apart = abs(difference(cell_centre(h, unmorton(node.code)), x)) - h;
+    Grid g = grid.at[0];
+    uvec3 cell = unmorton(node.code);
+    vec3 h = half_cell(g, node.level, cell);
+    precise vec3 apart = abs(difference(cell_centre(g, node.level, h, cell), x)) - h;
     precise vec3 d = max(apart * two_to(-21) - 2.0, vec3(0.0));
     return dot_product(d, d);
 }

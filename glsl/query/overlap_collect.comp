@@ -11,7 +11,7 @@ ARGUMENTS(9)
     uint tets;
     uint stride;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid) // of the other mesh
+GRID(0, readonly) // of the other mesh
 BUFFER(1, readonly, float, own_positions)
 RECORDS(2, uvec4, own_cells)
 BUFFER(3, readonly, uint, bad)

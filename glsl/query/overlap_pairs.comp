@@ -18,7 +18,7 @@ ARGUMENTS(15)
     uint tets;
     uint capacity; // pairs that `found` holds
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid) // of the other mesh, like all up to `positions`
+GRID(0, readonly) // of the other mesh, like all up to `positions`
 BUFFER(1, readonly, uint, masks)
 BUFFER(2, readonly, uint, co)
 BUFFER(3, readonly, uint, po)

@@ -43,7 +43,17 @@ bool touches_node(Node node) {
     precise vec3 scaled = f.half_size.xyz * part;
     vec3 size = vec3(f.flat_axis.x == 0.0 ? scaled.x : f.half_size.x, f.flat_axis.y == 0.0 ? scaled.y : f.half_size.y,
                      f.flat_axis.z == 0.0 ? scaled.z : f.half_size.z);
-    precise vec3 at = f.corner.xyz + vec3(2u * unmorton(node.code) + 1u) * size;
+    uvec3 cell = unmorton(node.code), shift = uvec3(MAX_LEVEL - node.level);
+    precise vec3 away = vec3(2u * cell + 1u) * size;
+    for (uint c = 0u; c < 3u && g.graded != 0u; ++c) {
+        float lower = graded_side(c, cell[c] << shift[c]), upper = graded_side(c, (cell[c] + 1u) << shift[c]);
+        precise float unit = f.scale * two_to(39);
+        precise float length = (upper - lower) * unit, twice = (upper + lower) * unit;
+        if (f.flat_axis[c] != 0.0) continue;
+        size[c] = length;
+        away[c] = twice;
+    }
+    precise vec3 at = f.corner.xyz + away;
     precise vec3 centre = floor(at * two_to(42)) * two_to(-42);
     precise vec3 h = size + two_to(18);
     vec3 around[4] = vec3[4](difference(v[0], centre), difference(v[1], centre), difference(v[2], centre), difference(v[3], centre));

@@ -9,7 +9,7 @@ ARGUMENTS(4)
     uint count;
     uint stride; // floats from one point to the next
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER(1, readonly, float, points)
 BUFFER(2, writeonly, uint, codes)
 BUFFER(3, writeonly, uint, order)

@@ -19,7 +19,7 @@ layout(constant_id = 9) const uint ON_CELLS = 0;
 ARGUMENTS(10 + STRUCTURE_BUFFERS)
     uint fresh; // not 0: nothing has been done yet
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 RECORDS(1, uvec4, cells)
 RECORDS(2, vec4, vertices)
 RECORDS(3, uvec4, neighbours)

@@ -20,7 +20,7 @@ ARGUMENTS(2)
     uint first_cell;
     uint last_cell;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER16(1, writeonly, SliceUniforms, plans)
 
 vec4 wide(float a[3]) { return vec4(a[0], a[1], a[2], 0.0); }

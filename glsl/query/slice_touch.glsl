@@ -18,7 +18,7 @@ ARGUMENTS(8 + STRUCTURE_BUFFERS)
 #endif
     uint budget; // nodes and tetrahedra per voxel and dispatch
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 RECORDS(1, uvec4, cells)
 RECORDS(2, vec4, vertices)
 BUFFER16(3, readonly, SliceUniforms, plans)

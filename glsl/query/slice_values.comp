@@ -13,7 +13,7 @@ layout(constant_id = 4) const uint FIELD = 1;
 ARGUMENTS(9)
     uint voxels; // of the band
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 RECORDS(1, uvec4, cells)
 RECORDS(2, vec4, vertices)
 BUFFER(3, readonly, float, field)

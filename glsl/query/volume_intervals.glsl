@@ -18,7 +18,7 @@ layout(constant_id = 5) const uint DEPTH = 0;
 ARGUMENTS(8 + STRUCTURE_BUFFERS)
     uint items; // pixels in whole blocks
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 RECORDS(1, uvec4, cells)    // for the binary tree only
 RECORDS(2, vec4, vertices)  // for the binary tree only
 BUFFER16(3, readonly, Frame, frames)

@@ -16,7 +16,7 @@ layout(constant_id = 6) const uint ISO = 0;
 layout(constant_id = 7) const uint DEPTH = 0;
 layout(constant_id = 8) const uint BUDGET = 1024; // tetrahedra tested per ray and dispatch, roughly
 NO_SCALARS(11 + STRUCTURE_BUFFERS) // the most that there is room for
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 RECORDS(1, uvec4, cells)
 RECORDS(2, vec4, vertices)
 RECORDS(3, uvec4, neighbours)

@@ -15,7 +15,7 @@ ARGUMENTS(6)
     uint last_cell;
     uint octree; // not 0: there is one
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+GRID(0, readonly)
 BUFFER16(1, readonly, ViewUniforms, views)
 RECORDS(2, vec4, table)
 BUFFER16(3, writeonly, Frame, frames)

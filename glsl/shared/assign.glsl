@@ -17,13 +17,14 @@ struct Filter {
 };
 
 vec3 inflated(Grid g, vec3 h) {
-    precise vec3 r = h + (g.extent.xyz * two_to(-20) + two_to(-41));
+    precise vec3 r = h + (g.extent.xyz * two_to(g.graded == 0u ? -20 : -18) + two_to(-41));
     return r;
 }
 
-Filter make_filter(Tet t, Grid g, uint level, uint assign) {
+// For cells with half size h.
+Filter make_filter(Tet t, Grid g, vec3 h, uint assign) {
     Filter f;
-    f.h = half_cell(g, level);
+    f.h = h;
     vec3 box_half = inflated(g, f.h);
     precise vec3 size = max(max(t.v[0], t.v[1]), max(t.v[2], t.v[3])) - min(min(t.v[0], t.v[1]), min(t.v[2], t.v[3]));
     precise vec3 slack = (size + 2.0 * box_half) * two_to(-18) + two_to(-42);
@@ -69,8 +70,7 @@ Filter make_filter(Tet t, Grid g, uint level, uint assign) {
     return f;
 }
 
-bool touches(Filter f, uvec3 cell) {
-    vec3 centre = cell_centre(f.h, cell);
+bool touches(Filter f, vec3 centre) {
     for (uint i = 0u; i < 4u; ++i) {
         precise vec3 u = centre - f.at[i];
         if (dot_product(f.normal[i], u) > f.limit[i]) return false;

@@ -10,17 +10,21 @@ struct Sought {
 };
 
 // How many finest cells a box grows by on every side so that it contains all points that its tetrahedron may own.
-uint cells_beyond(float tolerance) { return 1u + whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0); }
+// Those of a graded grid may be 64 times as small.
+uint cells_beyond(Grid g, float tolerance) {
+    precise float cells = clamp(tolerance, 0.0, 1.0) * (g.graded == 0u ? 4096.0 : 262144.0);
+    return 1u + whole_of(cells);
+}
 
 // Whether quarters and slabs leave room for a tolerance.
-bool leaves_room(float tolerance) { return cells_beyond(tolerance) == 1u; }
+bool leaves_room(Grid g, float tolerance) { return cells_beyond(g, tolerance) == 1u; }
 
 // The point `at`, in the units of the mesh. A point with barycentric coordinates of at least -t lies outside of the
 // tetrahedron's box by at most 3 t times the size of the box.
 Sought sought_at(Grid g, vec3 at, vec3 x, float tolerance) {
     uvec3 cell = quantize(g, at);
-    uvec3 reach = reach_of(g, cells_beyond(tolerance));
-    return Sought(x, cell - min(cell, reach), cell + reach, leaves_room(tolerance) ? quarters_around(g, cell) : 0u);
+    uvec3 reach = reach_of(g, cells_beyond(g, tolerance));
+    return Sought(x, cell - min(cell, reach), cell + reach, leaves_room(g, tolerance) ? quarters_around(g, cell) : 0u);
 }
 
 // Whether a tetrahedron's quantized box is near enough for it to own the point. This reads one word per vertex, its

@@ -6,6 +6,7 @@ float cell_side(Grid g, uint c, uint level, uint k) {
     precise float extent = g.hi[c] - g.lo[c];
     precise float along = float(k) * two_to(-int(level));
     precise float offset = canonical(extent) * along;
+    if (g.graded != 0u) offset = graded_side(c, k << (MAX_LEVEL - level));
     precise float x = g.lo[c] + offset;
     return canonical(x);
 }

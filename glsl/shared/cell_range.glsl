@@ -8,8 +8,7 @@ bool reached_cells(Grid g, vec3 centre, vec3 reach, out uvec3 lo, out uvec3 hi) 
     a = vec3(canonical(a.x), canonical(a.y), canonical(a.z));
     b = vec3(canonical(b.x), canonical(b.y), canonical(b.z));
     size = vec3(canonical(size.x), canonical(size.y), canonical(size.z));
-    precise vec3 qa = a * g.inv.xyz, qb = b * g.inv.xyz;
-    lo = cell_at(qa);
-    hi = cell_at(qb);
+    lo = cell_at(in_cells(g, a));
+    hi = cell_at(in_cells(g, b));
     return all(greaterThanEqual(b, vec3(0.0))) && all(lessThanEqual(a, size));
 }

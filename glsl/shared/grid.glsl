@@ -2,6 +2,9 @@
 
 const uint MAX_LEVEL = 10u; // Level of the finest grid, and number of bits per axis of its 32-bit Morton codes.
 
+const uint STRETCHES = 16u;      // Of an axis of a graded grid: intervals with equally many cells, each as wide.
+const uint STRETCH_CELLS = 64u;  // Cells of the finest grid in a stretch.
+
 float two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
 
 // x, or 0 if it is denormal.
@@ -28,6 +31,32 @@ bool near_bounds(Grid g, vec3 x) {
     return finite && all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
 }
 
+// The arrays of a graded grid. They are read from memory where they are needed, since few grids are graded; whoever
+// includes this file defines them.
+vec4 knot(uint i);
+vec4 rate(uint i);
+
+// Distance from the lower corner in cells of the finest grid, monotone, and in a graded grid in [0, 1024].
+vec3 in_cells(Grid g, vec3 d) {
+    precise vec3 q = d * g.inv.xyz;
+    if (g.graded == 0u) return q;
+    precise vec3 sum = vec3(0.0);
+    for (uint i = 0u; i < STRETCHES; ++i) {
+        precise vec3 part = (d - knot(i).xyz) * rate(i).xyz;
+        sum = sum + clamp(part, vec3(0.0), vec3(float(STRETCH_CELLS)));
+    }
+    return sum;
+}
+
+// Where the lower side of a cell of the finest grid is in a graded grid: its distance from the lower corner.
+float graded_side(uint c, uint k) {
+    uint i = min(k / STRETCH_CELLS, STRETCHES - 1u);
+    float from = knot(i)[c];
+    precise float width = (knot(i + 1u)[c] - from) * two_to(-6);
+    precise float at = from + width * float(k - i * STRETCH_CELLS);
+    return at;
+}
+
 // The cell of the finest grid at this distance from the lower corner, in cells of that grid, clamped into the grid.
 uvec3 cell_at(vec3 q) {
     vec3 r = clamp(q, vec3(0.0), vec3(1023.0));
@@ -36,8 +65,7 @@ uvec3 cell_at(vec3 q) {
 
 // The cell of the finest grid that contains a point, clamped into the grid.
 uvec3 quantize(Grid g, vec3 x) {
-    precise vec3 q = from_corner(g, x) * g.inv.xyz;
-    return cell_at(q);
+    return cell_at(in_cells(g, from_corner(g, x)));
 }
 
 // Words of one bit for each cell of a level.

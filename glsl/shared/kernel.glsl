@@ -37,6 +37,12 @@
 // Elements of 16 bytes at addresses that are multiples of 16: one load each.
 #define BUFFER16(slot, access, T, name) ALIGNED_BUFFER(16, slot, access, T, name)
 
+// The grid, with the arrays of a graded one as grid.glsl wants them.
+#define GRID(slot, access)                                                                                                       \
+    BUFFER16(slot, access, Grid, grid)                                                                                           \
+    vec4 knot(uint i) { return grid.at[0].knots[i]; }                                                                            \
+    vec4 rate(uint i) { return grid.at[0].rates[i]; }
+
 #include "shared/records.glsl"
 
 const uint NONE = 0xffffffffu; // No tetrahedron: no neighbour, no owner.

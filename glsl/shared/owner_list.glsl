@@ -41,7 +41,7 @@ uint leaf_to_search(Grid g, vec3 at, vec3 x, float tolerance) {
     if (!near_bounds(g, at)) return NONE;
     uvec3 finest = quantize(g, at);
     uint leaf = find_leaf(g.level, finest);
-    return leaf == NONE || (leaves_room(tolerance) && side_of_slab(g, slab_scale(g), leaf, finest, x) != 0) ? NONE : leaf;
+    return leaf == NONE || (leaves_room(g, tolerance) && side_of_slab(g, slab_scale(g), leaf, finest, x) != 0) ? NONE : leaf;
 }
 
 // The owner, once the whole list has been searched; NONE if there is none.

@@ -12,7 +12,10 @@ struct Grid {
     uint ids;     // Bits of an entry of P that hold its tetrahedron; the bits above are its quarters, if there are any.
     uint slabs;   // Word of PO where the slabs of the leaves begin; 0: there are none.
     uint longest; // Entries of the longest leaf.
-    uint pad[2];  // Unused.
+    uint graded;  // Not 0: cells are smaller where the mesh has more tetrahedra, see src/mesh/grading.rs.
+    uint pad;     // Unused.
+    vec4 knots[17]; // If it is graded: where the stretches of each axis begin, as distances from `lo`, and the extent.
+    vec4 rates[16]; // If it is graded: finest cells per unit of length in each stretch, 0 on a flat axis.
 };
 
 // Device addresses of a mesh and its tree, for the shaders of other programs, low word first. See src/glsl.rs.

@@ -8,12 +8,15 @@ struct Centres {
     ivec3 hi;
 };
 
-Centres centres_of(Tet tet, vec3 h, CellBox box) {
+// The centre of a cell of the tree's level.
+vec3 centre_of(Grid g, uvec3 cell) { return cell_centre(g, g.level, half_cell(g, g.level, cell), cell); }
+
+Centres centres_of(Tet tet, Grid g, CellBox box) {
     vec3 lo = min(min(tet.v[0], tet.v[1]), min(tet.v[2], tet.v[3])), hi = max(max(tet.v[0], tet.v[1]), max(tet.v[2], tet.v[3]));
     uvec3 last = box.lo + box.size - 1u;
     Centres c;
-    c.lo = ivec3(box.lo) + ivec3(lessThan(cell_centre(h, box.lo), lo));
-    c.hi = ivec3(last) - ivec3(greaterThan(cell_centre(h, last), hi));
+    c.lo = ivec3(box.lo) + ivec3(lessThan(centre_of(g, box.lo), lo));
+    c.hi = ivec3(last) - ivec3(greaterThan(centre_of(g, last), hi));
     return c;
 }
 

@@ -1,6 +1,6 @@
 // The buffers of a tree, six from `slot` on, as tree.glsl reads them.
 #define TREE(slot)                          \
-    BUFFER16(slot, readonly, Grid, grid)    \
+    GRID(slot, readonly)                    \
     BUFFER(slot + 1, readonly, uint, masks) \
     BUFFER(slot + 2, readonly, uint, co)    \
     BUFFER(slot + 3, readonly, uint, po)    \

@@ -67,6 +67,7 @@ impl std::fmt::Display for Kind {
 }
 
 /// A structure on the device.
+#[expect(clippy::large_enum_variant, reason = "there are few, and they are not moved about")]
 pub(super) enum Structure {
     Octree(Tree),
     Lbvh(Lbvh),

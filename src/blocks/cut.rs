@@ -189,7 +189,7 @@ impl<'a> Source<'a> {
     /// longest side where that is possible, after a cell of the finest grid on an axis, both of which `may` must allow.
     pub(super) fn cut_in_two(&self, block: &Block, pieces: usize, may: May<'_>) -> Option<[Block; 2]> {
         let span = block.span?;
-        let length = |c: usize| f64::from(span.size()[c]) * (f64::from(self.grid.hi[c]) - f64::from(self.grid.lo[c]));
+        let length = |c: usize| away(&self.grid, self.level, c, span.hi[c] + 1) - away(&self.grid, self.level, c, span.lo[c]);
         let mut axes = [0, 1, 2];
         axes.sort_by(|&a, &b| length(b).total_cmp(&length(a)));
         axes.into_iter().filter(|&c| span.lo[c] < span.hi[c]).find_map(|axis| self.cut_across(block, span, axis, pieces, may))
@@ -221,6 +221,14 @@ impl<'a> Source<'a> {
             halves.iter().all(|h| h.tets.len() < block.tets.len()).then_some(halves)
         })
     }
+}
+
+/// The distance of the lower side of cell `k` of a level from the lower corner along axis `c`.
+fn away(grid: &Grid, level: u32, c: usize, k: u32) -> f64 {
+    if grid.graded != 0 {
+        return f64::from(grid.graded_side(c, k << (MAX_LEVEL - level)));
+    }
+    (f64::from(grid.hi[c]) - f64::from(grid.lo[c])) * f64::from(k) / f64::from(1 << level)
 }
 
 /// A box of octree cells and its tetrahedra.
@@ -273,8 +281,7 @@ impl Block {
     /// The corners of its cells in the units of the mesh; `None` if they contain nothing.
     pub(super) fn bounds(&self, source: &Source<'_>) -> Option<[[f64; 3]; 2]> {
         let span = self.span?;
-        let [lo, hi] = [source.grid.lo, source.grid.hi].map(|p| p.map(f64::from));
-        let at = |c: usize, k: u32| lo[c] + (hi[c] - lo[c]) * f64::from(k) / f64::from(1 << source.level);
+        let at = |c: usize, k: u32| f64::from(source.grid.lo[c]) + away(&source.grid, source.level, c, k);
         Some([[0, 1, 2].map(|c| at(c, span.lo[c])), [0, 1, 2].map(|c| at(c, span.hi[c] + 1))])
     }
 

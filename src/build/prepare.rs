@@ -267,7 +267,7 @@ impl<'a> Stage0<'a> {
         let MeshInput { positions, stride, points, cells, tets } = *self.input;
         let MeshArrays { status, grid, bad, vertices, .. } = *self.arrays;
         let MeshScratch { shapes, thin, .. } = *self.scratch;
-        let (workgroup, once) = (r.gpu().target().each, r.gpu().subgroup_size());
+        let workgroup = r.gpu().target().each;
         let tile = summing_tile(tets, workgroup);
         let tiles = self.groups(tile);
         r.barrier("mesh.clear → mesh.check_cells");
@@ -278,7 +278,8 @@ impl<'a> Stage0<'a> {
             if let Some(given) = given {
                 r.copy(given, grid.part(0, given.size));
             } else {
-                r.dispatch(&MakeGrid { status, grid }, MakeGridSpec { workgroup: once, ..Default::default() }, Groups::Count(1))?;
+                let make = MakeGrid { status, grid, positions, cells, bad, tets, stride };
+                r.dispatch(&make, MakeGridSpec { workgroup, ..Default::default() }, Groups::Count(1))?;
             }
             r.barrier("mesh.make_grid → mesh.normalise_vertices");
             let spec = NormaliseVerticesSpec { workgroup, ..Default::default() };

@@ -3,7 +3,7 @@
 use super::Group;
 use super::data::Random;
 use crate::error::Result;
-use crate::mesh::{Mesh, cases::axle, kuhn, kuhn_jittered};
+use crate::mesh::{Mesh, cases::axle, far_field, kuhn, kuhn_jittered};
 
 /// A named mesh.
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +85,8 @@ const RECIPES: &[Entry] = &[
     ("slivers", Group::Quick, slivers),
     ("huge-among-small", Group::Quick, huge_among_small),
     ("outlier-1e12", Group::Quick, outlier),
+    ("far-field-8", Group::Quick, || far_field(8)),
+    ("far-field-16", Group::Full, || far_field(16)),
     ("renumbered", Group::Quick, renumbered),
     ("signs-mixed", Group::Full, signs_mixed),
     ("cloud", Group::Quick, || cloud(500)),

@@ -13,7 +13,9 @@ use crate::options::{Assign, Lists};
 
 /// Meshes that fill their space without overlap: every point of a tetrahedron has an owner, which does not depend on
 /// the tree.
-const CLOSED: [&str; 6] = ["kuhn-5x3x7", "kuhn-16x16x16", "jitter-12x13x11", "renumbered", "scaled-1e30", "far"];
+const CLOSED: [&str; 7] = ["kuhn-5x3x7", "kuhn-16x16x16", "jitter-12x13x11", "renumbered", "scaled-1e30", "far", GRADED];
+/// A mesh whose grid is graded.
+const GRADED: &str = "far-field-8";
 /// Meshes so small that voxels have denormal centres, which devices may flush to 0.
 const NEAR_DENORMAL: [&str; 2] = ["scaled-1e-38", "scaled-1e-42"];
 /// Meshes without extent, in which there is nothing to slice.
@@ -21,7 +23,8 @@ const WITHOUT_EXTENT: [&str; 4] = ["no-points", "no-cells", "one-place", "only-b
 /// A mesh whose overlap takes the reference implementation minutes.
 const LARGE: &str = "jitter-24x24x24";
 /// Cases for ranges of a field: mesh, α, assignment, lists, and what the values belong to.
-const RANGED: [(&str, f32, Assign, Lists, On); 8] = [
+const RANGED: [(&str, f32, Assign, Lists, On); 9] = [
+    (GRADED, 0.0, Assign::Planes, Lists::Boundary, On::Points),
     ("no-cells", 0.0, Assign::Aabb, Lists::All, On::Points),
     ("one-tet", 0.0, Assign::Exact, Lists::All, On::Cells),
     ("bad-cells", 1.0, Assign::Aabb, Lists::Boundary, On::Cells),
@@ -37,10 +40,12 @@ const PEAK: &str = "0:0,0.3:0,0.33:0.8,0.36:0,0.7:0,0.7:0.1,0.72:0.1,0.72:0,1:0"
 const PEAKED: &str = "jitter-12x13x11";
 /// A camera in this mesh, with a wide angle.
 const WITHIN: &str = "eye=6.3,6.1,5.2,target=1,2,11,fov=110";
+/// A camera close to the hole of [`GRADED`].
+const MIDDLE: &str = "eye=0.02,0.015,0.01,target=0,0,0,fov=40";
 /// Clips across the view and, from the top, along it.
 const CLIPS: &str = "view=60% x=70%";
 /// Meshes that are drawn.
-const DRAWN: [&str; 5] = ["one-tet", "kuhn-5x3x7", "jitter-12x13x11", "two-apart", "renumbered"];
+const DRAWN: [&str; 6] = ["one-tet", "kuhn-5x3x7", "jitter-12x13x11", "two-apart", "renumbered", GRADED];
 
 pub(super) fn add(cases: &mut Vec<Case>) {
     for mesh in recipes() {
@@ -68,6 +73,14 @@ pub(super) fn add(cases: &mut Vec<Case>) {
         }
         for (_, alpha, assign, lists, on) in RANGED.into_iter().filter(|of| of.0 == mesh.name) {
             add_ranges(cases, RangesCase { mesh, alpha, assign, lists, on });
+        }
+        if mesh.name == GRADED {
+            // The camera sees the middle.
+            for (camera, parts) in [("iso", true), (MIDDLE, false)] {
+                let opacity = Some(PEAK);
+                let case = PictureCase { mesh, camera, clips: "", on: On::Points, shading: true, opacity, iso: &[], parts };
+                add_picture(cases, Group::Quick, case);
+            }
         }
         // Iso-surfaces that are seen through one another, and opaque ones.
         let surfaces: &[f32] = &[0.2, -0.3, 0.9];
@@ -132,7 +145,7 @@ fn add_pictures(cases: &mut Vec<Case>, mesh: MeshRecipe) {
 
 fn add_picture(cases: &mut Vec<Case>, group: Group, case: PictureCase) {
     let PictureCase { mesh, camera, clips, on, shading, opacity, iso, parts } = case;
-    let camera = if camera == WITHIN { "within" } else { camera.split(',').next().unwrap_or(camera) };
+    let camera = if camera == WITHIN || camera == MIDDLE { "within" } else { camera.split(',').next().unwrap_or(camera) };
     let parts = if parts { "/parts" } else { "" };
     let clipped = if clips.is_empty() { "" } else { "/clipped" };
     let light = if shading { "/shaded" } else { "" };

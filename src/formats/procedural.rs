@@ -2,7 +2,7 @@
 
 use super::{CellCount, Fate, Loaded, Report};
 use crate::error::{Error, Result};
-use crate::mesh::{Mesh, graded, kuhn_jittered, shell, slivers};
+use crate::mesh::{Mesh, far_field, graded, kuhn_jittered, shell, slivers};
 use std::time::Instant;
 
 /// The mesh that a text names, and its description; `None` if the text is not the name of a procedural mesh.
@@ -10,6 +10,7 @@ pub(crate) fn make(text: &str) -> Option<Result<(String, Mesh)>> {
     let (name, size) = text.split_once(':')?;
     let of: fn(u32) -> Result<Mesh> = match name {
         "kuhn" => return Some(kuhn(size)),
+        "far-field" => far_field,
         "graded" => graded,
         "shell" => shell,
         "slivers" => slivers,

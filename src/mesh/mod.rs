@@ -3,6 +3,7 @@
 mod along_curve;
 mod bounds;
 pub mod cases;
+mod grading;
 mod kuhn;
 mod measure;
 mod procedural;
@@ -12,9 +13,9 @@ mod warp;
 pub use bounds::Bounds;
 pub(crate) use kuhn::hash;
 pub use kuhn::{kuhn, kuhn_jittered};
-pub use procedural::{graded, shell, slivers};
+pub use procedural::{far_field, graded, shell, slivers};
 pub use validity::{Fault, fault_of, is_usable, valid_grid};
-pub(crate) use validity::{bounds, words};
+pub(crate) use validity::{grid_of, words};
 
 use crate::error::{Error, Result};
 

@@ -6,6 +6,8 @@ use crate::error::{Error, Result};
 
 /// Ratio of the widths of the last and the first cubes of [`graded`], per axis.
 const GRADE: f32 = 100.0;
+/// How many times the last cubes of [`far_field`] are as far from the middle as the first ones are wide.
+const FIELD: f32 = 1e4;
 /// Layers of cubes in the wall of [`shell`].
 const LAYERS: u32 = 4;
 
@@ -18,6 +20,28 @@ pub fn graded(n: u32) -> Result<Mesh> {
     for x in mesh.points.iter_mut().flatten() {
         *x = (GRADE.powf(*x / n as f32) - 1.0) / (GRADE - 1.0);
     }
+    Ok(mesh)
+}
+
+/// A box of ±1 around a small hole, as meshes for the flow around a body are: 6·n³ tetrahedra, without those of the n/4
+/// cubes along each axis in the middle, whose sizes grow from there on by some 10^4. Nearly all of them lie where a
+/// regular grid over the box has a few cells.
+///
+/// # Errors
+/// [`Error::Invalid`] unless n is a multiple of 8 and not 0, otherwise those of [`super::kuhn`].
+pub fn far_field(n: u32) -> Result<Mesh> {
+    if n == 0 || !n.is_multiple_of(8) {
+        return Err(Error::Invalid(format!("a far field of {n} cubes: a multiple of 8 is needed")));
+    }
+    let Mesh { mut points, mut tets, fields, .. } = kuhn_jittered([n; 3], 0.1, 5)?;
+    let in_hole = |v: u32| (0..3).all(|c| (3 * n / 8..=5 * n / 8).contains(&(v / (n + 1).pow(c) % (n + 1))));
+    tets.retain(|t| !t.iter().all(|&v| in_hole(v)));
+    for x in points.iter_mut().flatten() {
+        let from_middle = 2.0 * *x / n as f32 - 1.0;
+        *x = (FIELD.powf(from_middle.abs()) - 1.0).copysign(from_middle) / (FIELD - 1.0);
+    }
+    let mut mesh = Mesh::new(points, tets);
+    mesh.fields = fields;
     Ok(mesh)
 }
 

@@ -1,6 +1,7 @@
 //! Which tetrahedra of a mesh are valid, and the bounds and the grid of those that are (SPEC 2.1, 2.3).
 
 use super::Mesh;
+use super::grading::grid_over;
 use crate::grid::{COORDINATE_LIMIT, Grid, canonical, per_axis};
 use crate::layout::bit;
 use rayon::prelude::*;
@@ -34,8 +35,13 @@ pub(crate) fn words(n: usize, answer: &(dyn Fn(u32) -> bool + Sync)) -> Vec<u32>
 
 /// The grid over the vertices that valid tetrahedra use, at the finest level, that of every tree over the mesh.
 pub fn valid_grid(mesh: &Mesh) -> Grid {
-    let (lo, hi) = bounds(mesh, &words(mesh.tets.len(), &|t| fault_of(mesh, t).is_none()));
-    Grid::new(lo, hi)
+    grid_of(mesh, &words(mesh.tets.len(), &|t| fault_of(mesh, t).is_none()))
+}
+
+/// The same, where it is known which tetrahedra are valid.
+pub(crate) fn grid_of(mesh: &Mesh, valid: &[u32]) -> Grid {
+    let (lo, hi) = bounds(mesh, valid);
+    grid_over(mesh, valid, [lo, hi])
 }
 
 /// Whether all coordinates of a point are finite and small enough to compute with.
@@ -55,7 +61,7 @@ pub fn fault_of(mesh: &Mesh, tet: u32) -> Option<Fault> {
 }
 
 /// Lower and upper corner of the valid tetrahedra; an empty box if there are none.
-pub(crate) fn bounds(mesh: &Mesh, valid: &[u32]) -> ([f32; 3], [f32; 3]) {
+fn bounds(mesh: &Mesh, valid: &[u32]) -> ([f32; 3], [f32; 3]) {
     let empty = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     let join = |a: ([f32; 3], [f32; 3]), b: ([f32; 3], [f32; 3])| (per_axis(|c| a.0[c].min(b.0[c])), per_axis(|c| a.1[c].max(b.1[c])));
     let of = |bounds, (t, ids): (usize, &[u32; 4])| {

@@ -23,7 +23,7 @@
 //! `(B·reciprocal(|V|))·2^-16` of the width, and slivers with `|V| ≤ B·2^-12` have no edge tests.
 
 use super::tet::{EDGES, FACES, Tet, Vec3, abs, cross, cross_bound, dot, sub};
-use crate::grid::{Grid, per_axis, reciprocal, two_to};
+use crate::grid::{Grid, MAX_LEVEL, canonical, per_axis, reciprocal, two_to};
 use crate::options::Assign;
 
 /// A face plane. A box is outside if `dot(normal, centre − at) > limit`.
@@ -46,7 +46,6 @@ struct Shadow {
 #[derive(Clone, Debug)]
 pub struct Filter {
     assign: Assign,
-    h: Vec3,
     faces: [Face; 4],
     edges: bool,
     at: [Vec3; 6],
@@ -54,29 +53,54 @@ pub struct Filter {
     shadows: [[Shadow; 3]; 6],
 }
 
-/// Half the size of a cell of `level` per axis in normalised coordinates, without allowance for rounding.
-pub fn half_cell(grid: &Grid, level: u32) -> Vec3 {
-    let scale = two_to(-1 - level as i32);
-    per_axis(|c| if grid.inv[c] == 0.0 { grid.extent[c] * 0.5 } else { grid.extent[c] * scale })
+/// The lower side of a cell of the finest grid in normalised coordinates, if the grid is graded.
+fn normalised_side(grid: &Grid, c: usize, k: u32) -> f32 {
+    (canonical(grid.graded_side(c, k) * grid.scale) * two_to(82)).floor() * two_to(-42)
+}
+
+/// Half the size of a cell of `level` per axis in normalised coordinates, without allowance for rounding. Unless the grid
+/// is graded, it is that of all cells of the level.
+pub fn half_cell(grid: &Grid, level: u32, cell: [u32; 3]) -> Vec3 {
+    let (scale, shift) = (two_to(-1 - level as i32), MAX_LEVEL - level);
+    per_axis(|c| {
+        if grid.inv[c] == 0.0 {
+            grid.extent[c] * 0.5
+        } else if grid.graded == 0 {
+            grid.extent[c] * scale
+        } else {
+            (normalised_side(grid, c, (cell[c] + 1) << shift) - normalised_side(grid, c, cell[c] << shift)) * 0.5
+        }
+    })
 }
 
 /// Half the size of a cell's box, with the allowance for rounding.
 pub fn inflated(grid: &Grid, h: Vec3) -> Vec3 {
-    per_axis(|c| h[c] + (grid.extent[c] * two_to(-20) + two_to(-41)))
+    let part = two_to(if grid.graded == 0 { -20 } else { -18 });
+    per_axis(|c| h[c] + (grid.extent[c] * part + two_to(-41)))
 }
 
-/// Centre of the box of a cell with half size `h`.
-pub fn cell_centre(h: Vec3, cell: [u32; 3]) -> Vec3 {
-    per_axis(|c| (((2 * cell[c] + 1) as f32 * h[c]) * two_to(42)).floor() * two_to(-42))
+/// Centre of a cell of `level` with half size `h`.
+pub fn cell_centre(grid: &Grid, level: u32, h: Vec3, cell: [u32; 3]) -> Vec3 {
+    per_axis(|c| {
+        let at = if grid.graded != 0 && grid.inv[c] != 0.0 {
+            normalised_side(grid, c, cell[c] << (MAX_LEVEL - level)) + h[c]
+        } else {
+            (2 * cell[c] + 1) as f32 * h[c]
+        };
+        (at * two_to(42)).floor() * two_to(-42)
+    })
+}
+
+/// Centre of a cell of `level`.
+pub fn centre_of(grid: &Grid, level: u32, cell: [u32; 3]) -> Vec3 {
+    cell_centre(grid, level, half_cell(grid, level, cell), cell)
 }
 
 impl Filter {
-    /// The filter of `tet` for cells of `level` (0…10) under `assign`.
-    pub fn new(tet: &Tet, grid: &Grid, level: u32, assign: Assign) -> Self {
-        let h = half_cell(grid, level);
+    /// The filter of `tet` for cells with half size `h` under `assign`.
+    pub fn new(tet: &Tet, grid: &Grid, h: Vec3, assign: Assign) -> Self {
         let mut filter = Self {
             assign,
-            h,
             faces: [Face::default(); 4],
             edges: false,
             at: [[0.0; 3]; 6],
@@ -127,12 +151,11 @@ impl Filter {
         filter
     }
 
-    /// Whether the tetrahedron's entry in the candidate `cell` (one in its quantized bounding box) is kept.
-    pub fn touches(&self, cell: [u32; 3]) -> bool {
+    /// Whether the tetrahedron's entry in the candidate with this centre (a cell in its quantized bounding box) is kept.
+    pub fn touches(&self, centre: Vec3) -> bool {
         if self.assign == Assign::Aabb {
             return true;
         }
-        let centre = cell_centre(self.h, cell);
         for face in &self.faces {
             if dot(face.normal, sub(centre, face.at)) > face.limit {
                 return false;

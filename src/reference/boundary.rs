@@ -6,7 +6,7 @@ use super::tet::Tet;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::layout::{NONE, bit};
-use crate::mesh::{Fault, Mesh, bounds, fault_of, words};
+use crate::mesh::{Fault, Mesh, fault_of, grid_of, words};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -59,9 +59,9 @@ impl Topology {
         }
         let bad: Vec<_> = (0..mesh.tets.len() as u32).into_par_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect();
         let valid = words(mesh.tets.len(), &|t| bad.binary_search_by_key(&t, |b| b.0).is_err());
-        let (lo, hi) = bounds(mesh, &valid);
         let counts = Counts { cells: mesh.tets.len() as u32, bad: bad.len() as u32, ..Counts::default() };
-        Ok(Self { neighbours: Vec::new(), boundary: Vec::new(), valid, grid: Grid::new(lo, hi), counts, bad })
+        let grid = grid_of(mesh, &valid);
+        Ok(Self { neighbours: Vec::new(), boundary: Vec::new(), valid, grid, counts, bad })
     }
 
     /// Whether tetrahedron `tet` is valid, that is, part of every structure.

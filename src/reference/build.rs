@@ -10,7 +10,7 @@ use crate::grid::{Grid, MAX_LEVEL};
 use crate::mesh::Mesh;
 use crate::options::{BuildOptions, Lists};
 use crate::tree::TreeArrays;
-use crate::tree::stored::id_mask;
+use crate::tree::stored::ids_in;
 
 /// A tree, and the intermediate results that its arrays do not contain.
 #[derive(Clone, Debug)]
@@ -54,7 +54,7 @@ pub fn build(mesh: &Mesh, topology: &Topology, options: &BuildOptions) -> Result
 /// # Errors
 /// [`Error::TooLarge`] if 32 bits cannot count the entries.
 pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u32, options: &BuildOptions) -> Result<Construction> {
-    let grid = Grid { level, ids: id_mask(options.lists, mesh.tets.len()), ..topology.grid };
+    let grid = Grid { level, ids: ids_in(&topology.grid, options.lists, mesh.tets.len()), ..topology.grid };
 
     // Stage 2: calculate and sort the Morton codes of the entries.
     let all = Stage { mesh, topology, vertices, grid: &grid, assign: options.assign, marks: None };

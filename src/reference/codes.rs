@@ -1,7 +1,7 @@
 //! Stage 2: the cells that list each tetrahedron, as Morton codes, and their order (SPEC 2.2, the paper's Eq. 6). Twin
 //! of `glsl/build/2*`.
 
-use super::assign::{Filter, cell_centre, half_cell};
+use super::assign::{Filter, centre_of, half_cell};
 use super::boundary::Topology;
 use super::marks::{Marks, owns_centre};
 use super::sort::sort_pairs;
@@ -66,13 +66,14 @@ impl Stage<'_> {
     /// A predicate on the candidates of the valid tetrahedron `tet`: whether they list it.
     pub fn lists(&self, tet: u32) -> impl Fn([u32; 3]) -> bool {
         let primitive = self.vertices.tet(self.mesh.tets[tet as usize]);
-        let filter = Filter::new(&primitive, self.grid, self.grid.level, self.assign);
-        let half = half_cell(self.grid, self.grid.level);
+        let (grid, assign) = (self.grid, self.assign);
+        let filter_of = move |cell| Filter::new(&primitive, grid, half_cell(grid, grid.level, cell), assign);
+        let of_all = (grid.graded == 0).then(|| filter_of([0; 3]));
         let walker = Walker { mesh: self.mesh, neighbours: &self.topology.neighbours, normalised: &self.vertices.normalised };
         let inner = !self.topology.is_boundary(tet);
         move |cell| match self.marks {
-            Some(marks) if !marks.contains(cell) => inner && owns_centre(&walker, tet, &primitive, cell_centre(half, cell)),
-            _ => filter.touches(cell),
+            Some(marks) if !marks.contains(cell) => inner && owns_centre(&walker, tet, &primitive, centre_of(grid, grid.level, cell)),
+            _ => of_all.as_ref().unwrap_or(&filter_of(cell)).touches(centre_of(grid, grid.level, cell)),
         }
     }
 

@@ -32,8 +32,10 @@ pub struct Sizes {
 pub fn log_extent(points: [[f32; 3]; 4], grid: &Grid) -> u32 {
     let side = |c: usize| {
         let x = points.map(|p| canonical(p[c]));
-        let size = canonical(x[0].max(x[1]).max(x[2].max(x[3])) - x[0].min(x[1]).min(x[2].min(x[3])));
-        (size * grid.inv[c]).floor().clamp(0.0, 1024.0) as u32
+        let (lo, hi) = (x[0].min(x[1]).min(x[2].min(x[3])), x[0].max(x[1]).max(x[2].max(x[3])));
+        let at = |x: f32| grid.in_cells(c, canonical(x - grid.lo[c]));
+        let size = if grid.graded == 0 { canonical(hi - lo) * grid.inv[c] } else { at(hi) - at(lo) };
+        size.floor().clamp(0.0, 1024.0) as u32
     };
     side(0).max(side(1)).max(side(2)).checked_ilog2().unwrap_or(0)
 }

@@ -44,8 +44,8 @@ pub fn reached_cells(grid: &Grid, centre: [f32; 3], reach: [f32; 3]) -> Option<C
         if !(b >= 0.0 && a <= canonical(grid.hi[c] - grid.lo[c])) {
             return None;
         }
-        range.lo[c] = (a * grid.inv[c]).floor().clamp(0.0, 1023.0) as u32;
-        range.hi[c] = (b * grid.inv[c]).floor().clamp(0.0, 1023.0) as u32;
+        range.lo[c] = grid.in_cells(c, a).floor().clamp(0.0, 1023.0) as u32;
+        range.hi[c] = grid.in_cells(c, b).floor().clamp(0.0, 1023.0) as u32;
     }
     Some(range)
 }

@@ -8,7 +8,7 @@ use super::separate::box_touches;
 use super::splits::Splits;
 use super::tet::sub;
 use super::vertices::Vertices;
-use crate::grid::{Box6, Grid, canonical, two_to, unmorton};
+use crate::grid::{Box6, Grid, MAX_LEVEL, canonical, two_to, unmorton};
 use crate::layout::bit;
 use crate::mesh::Mesh;
 use crate::options::Lists;
@@ -35,7 +35,8 @@ pub fn cell_side(grid: &Grid, c: usize, level: u32, k: u32) -> f32 {
         grid.hi[c]
     } else {
         let size = two_to(-(level as i32));
-        canonical(grid.lo[c] + canonical(grid.hi[c] - grid.lo[c]) * (k as f32 * size))
+        let even = canonical(grid.hi[c] - grid.lo[c]) * (k as f32 * size);
+        canonical(grid.lo[c] + if grid.graded == 0 { even } else { grid.graded_side(c, k << (MAX_LEVEL - level)) })
     }
 }
 
@@ -50,8 +51,9 @@ pub fn flag(listed: &[u32], code: u32, lists: Lists, mesh: &Mesh, topology: &Top
     if boundary || lists == Lists::Boundary {
         return boundary;
     }
-    let half = half_cell(grid, grid.level);
-    let centre = cell_centre(half, unmorton(code));
+    let cell = unmorton(code);
+    let half = half_cell(grid, grid.level, cell);
+    let centre = cell_centre(grid, grid.level, half, cell);
     let axes = [[half[0], 0.0, 0.0], [0.0, half[1], 0.0], [0.0, 0.0, half[2]]];
     let touches = |&p: &u32| box_touches(&vertices.tet(mesh.tets[p as usize]).v.map(|v| sub(v, centre)), &axes, [0.0; 3]);
     !listed.is_empty() && !listed.iter().take(MAX_TOUCH_TESTS as usize).any(touches)

@@ -203,8 +203,9 @@ impl<'a> Locator<'a> {
     /// The cell of a leaf, given one of its finest cells.
     fn leaf_cell(&self, finest: [u32; 3]) -> LeafCell {
         let (grid, level) = (&self.tree.grid, self.tree.grid.level);
-        let half = half_cell(grid, level);
-        LeafCell { centre: cell_centre(half, finest.map(|q| q >> (MAX_LEVEL - level))), half }
+        let cell = finest.map(|q| q >> (MAX_LEVEL - level));
+        let half = half_cell(grid, level, cell);
+        LeafCell { centre: cell_centre(grid, level, half, cell), half }
     }
 
     /// The owner among the tetrahedra of a leaf, whether they are listed or reached by a walk.
@@ -222,7 +223,7 @@ impl<'a> Locator<'a> {
     /// Whether the leaf's slab says that x lies beside the mesh.
     fn is_beside(&self, leaf: u32, finest: [u32; 3], x: Vec3) -> bool {
         let (grid, slabs) = (&self.tree.grid, &self.tree.slabs);
-        let slab = slabs.get((leaf - self.tree.internal_nodes()) as usize).filter(|_| leaves_room(self.tolerance));
+        let slab = slabs.get((leaf - self.tree.internal_nodes()) as usize).filter(|_| leaves_room(&self.tree.grid, self.tolerance));
         slab.is_some_and(|&slab| SlabCell::new(grid, finest.map(|q| q >> (MAX_LEVEL - grid.level))).is_outside(slab, x))
     }
 

@@ -90,8 +90,9 @@ impl<'a> Surface<'a> {
 
     /// Squared distance of a node's cell, never larger than that of what it contains.
     fn square_of(&self, (_, level, code): Node, x: Vec3) -> f32 {
-        let h = half_cell(&self.tree.grid, level);
-        let from = sub(cell_centre(h, unmorton(code)), x);
+        let (grid, cell) = (&self.tree.grid, unmorton(code));
+        let h = half_cell(grid, level, cell);
+        let from = sub(cell_centre(grid, level, h, cell), x);
         let d = per_axis(|c| ((from[c].abs() - h[c]) * two_to(-21) - 2.0).max(0.0));
         dot(d, d)
     }

@@ -105,11 +105,17 @@ pub(crate) fn node_frame(grid: &Grid, joint: &Grid) -> NodeFrame {
 }
 
 /// Centre and half size of the box of a node, the half size with the allowance of step 2.
-fn node_box(frame: &NodeFrame, node: Node) -> (Vec3, Vec3) {
+fn node_box(grid: &Grid, frame: &NodeFrame, node: Node) -> (Vec3, Vec3) {
     let cell = unmorton(node.code);
     let half = per_axis(|c| if frame.flat_axis[c] == 0.0 { frame.half_size[c] * two_to(-(node.level as i32)) } else { frame.half_size[c] });
-    let at = |c: usize| frame.corner[c] + (2 * cell[c] + 1) as f32 * half[c];
-    let centre = per_axis(|c| (at(c) * two_to(42)).floor() * two_to(-42));
+    let mut away = per_axis(|c| (2 * cell[c] + 1) as f32 * half[c]);
+    let mut half = half;
+    for c in (0..3).filter(|&c| grid.graded != 0 && frame.flat_axis[c] == 0.0) {
+        let [lower, upper] = [cell[c], cell[c] + 1].map(|k| grid.graded_side(c, k << (MAX_LEVEL - node.level)));
+        let unit = frame.scale * two_to(39);
+        (half[c], away[c]) = ((upper - lower) * unit, (upper + lower) * unit);
+    }
+    let centre = per_axis(|c| ((frame.corner[c] + away[c]) * two_to(42)).floor() * two_to(-42));
     (centre, half.map(|h| h + two_to(18)))
 }
 
@@ -198,7 +204,7 @@ impl Direction<'_> {
             if tree.is_boundary(node.index) {
                 return node.level < tree.grid.level;
             }
-            let (centre, h) = node_box(&self.frame, node);
+            let (centre, h) = node_box(&tree.grid, &self.frame, node);
             let half = [[h[0], 0.0, 0.0], [0.0, h[1], 0.0], [0.0, 0.0, h[2]]];
             found = box_touches(&v.map(|p| sub(p, centre)), &half, [0.0; 3]);
             false

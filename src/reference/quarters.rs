@@ -73,18 +73,19 @@ pub fn octants_near(grid: &Grid, quarters: u32) -> u32 {
 }
 
 /// Whether quarters and slabs leave room for a tolerance: that of one finest cell.
-pub fn leaves_room(tolerance: f32) -> bool {
-    cells_beyond(tolerance) == 1
+pub fn leaves_room(grid: &Grid, tolerance: f32) -> bool {
+    cells_beyond(grid, tolerance) == 1
 }
 
-fn cells_beyond(tolerance: f32) -> u32 {
-    1 + (tolerance.clamp(0.0, 1.0) * 4096.0) as u32
+/// The finest cells of a graded grid may be 64 times as small.
+fn cells_beyond(grid: &Grid, tolerance: f32) -> u32 {
+    1 + (tolerance.clamp(0.0, 1.0) * if grid.graded == 0 { 4096.0 } else { 262_144.0 }) as u32
 }
 
 /// The number of finest cells by which the box of a tetrahedron is enlarged on each axis, so that it contains every
 /// point that this tolerance lets the tetrahedron own.
 pub fn reach(grid: &Grid, tolerance: f32) -> [u32; 3] {
-    grown(grid, cells_beyond(tolerance))
+    grown(grid, cells_beyond(grid, tolerance))
 }
 
 /// Whether a tetrahedron's quantized box is near enough for it to own a point in that finest cell.

@@ -25,7 +25,7 @@
 //! ([`super::separate`]). So a range is enlarged by 2^-16 of its summands, that of a box by as much of itself, and 2^-10 is
 //! room to spare.
 
-use super::assign::{cell_centre, half_cell};
+use super::assign::{centre_of, half_cell};
 use super::boundary::Topology;
 use super::quarters::COARSE;
 use super::splits::Splits;
@@ -49,9 +49,9 @@ pub struct SlabCell {
 impl SlabCell {
     /// Those of a cell of the leaves' level.
     pub fn new(grid: &Grid, cell: [u32; 3]) -> Self {
-        let half = half_cell(grid, grid.level);
+        let half = half_cell(grid, grid.level, [0; 3]);
         let inverse = per_axis(|c| if grid.extent[c] < COARSE { 0.0 } else { reciprocal(half[c]) });
-        Self { centre: cell_centre(half, cell), inverse }
+        Self { centre: centre_of(grid, grid.level, cell), inverse }
     }
 
     /// A point in normalised coordinates.
@@ -112,7 +112,7 @@ pub(super) struct Fit<'a> {
 impl Fit<'_> {
     /// The slab of a leaf with this list, boundary flag and Morton code.
     pub(super) fn slab(&self, listed: &[u32], boundary: bool, code: u32) -> u32 {
-        if !boundary || listed.len() > MAX_LIST_FOR_SLAB as usize {
+        if !boundary || listed.len() > MAX_LIST_FOR_SLAB as usize || self.grid.graded != 0 {
             return EVERYTHING;
         }
         let cell = SlabCell::new(self.grid, unmorton(code));

@@ -13,7 +13,7 @@ use crate::grid::{MAX_LEVEL, unmorton};
 use crate::layout::NONE;
 use crate::mesh::Mesh;
 use crate::options::Lists;
-use crate::tree::stored::id_mask;
+use crate::tree::stored::ids_in;
 use crate::tree::{TreeArrays, TreeStats};
 use rayon::prelude::*;
 
@@ -62,7 +62,7 @@ impl TreeArrays {
         rule(level <= MAX_LEVEL, || format!("grid: level {level} is beyond {MAX_LEVEL}"))?;
         let mut expected = topology.grid;
         (expected.level, expected.first_leaf) = (level, self.grid.first_leaf);
-        expected.ids = id_mask(self.lists, topology.neighbours.len());
+        expected.ids = ids_in(&topology.grid, self.lists, topology.neighbours.len());
         expected.slabs = if self.slabs.is_empty() { 0 } else { self.po.len() as u32 };
         expected.longest = self.grid.longest;
         rule(self.grid == expected, || format!("grid: {:?} is not that of the mesh, {expected:?}", self.grid))

@@ -11,6 +11,11 @@ pub fn id_mask(lists: Lists, tets: usize) -> u32 {
     bits.filter(|_| lists == Lists::Boundary).map_or(u32::MAX, |bits| (1 << bits) - 1)
 }
 
+/// [`id_mask`] of a tree with this grid: quarters are of cells of equal size, so there are none in graded grids.
+pub fn ids_in(grid: &Grid, lists: Lists, tets: usize) -> u32 {
+    if grid.graded == 0 { id_mask(lists, tets) } else { u32::MAX }
+}
+
 /// Splits entries, as a device stores them in a tree with this grid, into tetrahedra and quarters.
 pub fn split_entries(entries: Vec<u32>, grid: &Grid) -> (Vec<u32>, Vec<u16>) {
     if grid.ids == u32::MAX {

@@ -60,16 +60,22 @@ impl Stage {
     /// The numbers of candidates of all tetrahedra, of those kept, and of those that touch without any allowance.
     fn compare(&self, level: u32, assign: Assign) -> [u64; 3] {
         let mut n = [0; 3];
-        let h = half_cell(self.grid(), level);
         for &ids in self.mesh.tets.iter().enumerate().filter(|t| self.topology.is_valid(t.0 as u32)).map(|t| t.1) {
             let tet = self.vertices.tet(ids);
-            let filter = Filter::new(&tet, self.grid(), level, assign);
             for cell in self.vertices.cells(ids, level).iter() {
+                let h = half_cell(self.grid(), level, cell);
+                let filter = Filter::new(&tet, self.grid(), h, assign);
+                let centre = cell_centre(self.grid(), level, h, cell);
                 let exact = |margin| {
-                    let centre = cell_centre(h, cell).map(f64::from);
-                    touches_exactly(tet.v.map(|p| p.map(f64::from)), centre, h.map(f64::from), assign == Assign::Exact, margin)
+                    touches_exactly(
+                        tet.v.map(|p| p.map(f64::from)),
+                        centre.map(f64::from),
+                        h.map(f64::from),
+                        assign == Assign::Exact,
+                        margin,
+                    )
                 };
-                let kept = filter.touches(cell);
+                let kept = filter.touches(centre);
                 n[0] += 1;
                 n[1] += u64::from(kept);
                 n[2] += u64::from(exact(0.0));
@@ -142,7 +148,8 @@ fn check_point(stage: &Stage, t: usize, cell: [u32; 3], x: [f32; 3], name: &str)
         let cell = cell.map(|q| q >> (MAX_LEVEL - level));
         assert!(stage.vertices.cells(ids, level).contains(cell), "{name}: cell {cell:?} of level {level} is no candidate of {ids:?}");
         for assign in Assign::EVERY {
-            let kept = Filter::new(&tet, stage.grid(), level, assign).touches(cell);
+            let h = half_cell(stage.grid(), level, cell);
+            let kept = Filter::new(&tet, stage.grid(), h, assign).touches(cell_centre(stage.grid(), level, h, cell));
             assert!(kept, "{name}: {ids:?} loses cell {cell:?} of level {level} under {assign}, which holds {x:?}");
         }
     }

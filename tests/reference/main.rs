@@ -4,6 +4,7 @@
 mod assign;
 mod boundary;
 mod build;
+mod grading;
 mod lists;
 mod locate;
 mod nearest;

@@ -3,7 +3,7 @@
 use super::{Random, prepared};
 use olbvh::grid::{MAX_LEVEL, morton, unmorton};
 use olbvh::mesh::cases::cases;
-use olbvh::mesh::{graded, kuhn_jittered, shell, slivers};
+use olbvh::mesh::{far_field, graded, kuhn_jittered, shell, slivers};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::reference::assign::{cell_centre, half_cell};
 use olbvh::reference::brute;
@@ -29,7 +29,13 @@ fn beside_corners(random: &mut Random, corners: [[f32; 3]; 4], count: usize) -> 
 
 #[test]
 fn owners_stay_the_same() {
-    let made = [("slivers", slivers(3)), ("graded", graded(4)), ("shell", shell(9)), ("jittered", kuhn_jittered([5; 3], 0.3, 7))];
+    let made = [
+        ("slivers", slivers(3)),
+        ("graded", graded(4)),
+        ("shell", shell(9)),
+        ("jittered", kuhn_jittered([5; 3], 0.3, 7)),
+        ("far field", far_field(8)),
+    ];
     let made = made.into_iter().map(|(name, mesh)| (name.to_owned(), mesh.unwrap()));
     let meshes = cases().unwrap().into_iter().map(|case| (case.name.to_string(), case.mesh)).chain(made);
     let mut told = 0;
@@ -106,13 +112,13 @@ fn boxes_beside_slabs_are_not_touched() {
         for level in [2, 5] {
             let options = BuildOptions { slabs: true, ..BuildOptions::default() };
             let Construction { codes, tree } = construct(&mesh, &topology, &vertices, level, &options).unwrap();
-            let (first, half) = (tree.internal_nodes(), half_cell(&tree.grid, tree.grid.level));
+            let (first, half) = (tree.internal_nodes(), half_cell(&tree.grid, tree.grid.level, [0; 3]));
             for leaf in
                 tree.leaves().filter(|leaf| tree.slabs[(leaf - first) as usize] != EVERYTHING).step_by(1 + tree.leaves().len() / 100)
             {
                 let i = (leaf - first) as usize;
                 let (slab, cell) = (tree.slabs[i], unmorton(codes[tree.po[i] as usize]));
-                let centre = cell_centre(half, cell);
+                let centre = cell_centre(&tree.grid, tree.grid.level, half, cell);
                 for _ in 0..20 {
                     let size = 0.01 * 500f32.powf(random.next());
                     let axes = turned_axes(&mut random).map(|axis| [0, 1, 2].map(|c| axis[c] * size * half[c]));

@@ -20,7 +20,7 @@ Examples:
   olbvh bench graded:40 shell:200 --suite paper --repeat 9 --seconds 1 --json
   olbvh bench --compare a.json b.json       which times differ by more than their spread
 
-Procedural meshes: kuhn:NX,NY,NZ[,jitter=J], graded:N (cells of very different sizes), shell:N (thin walls), slivers:N (flat cells). The suite \
+Procedural meshes: kuhn:NX,NY,NZ[,jitter=J], graded:N (cells of very different sizes), far-field:N (a box 1,000 times as large as the hole in its middle), shell:N (thin walls), slivers:N (flat cells). The suite \
 determines the numbers of points, pixels and voxels, and the meshes unless MESH is given. Answers are verified before anything is timed. A mesh for which \
 one is wrong is not measured, nor is one that cannot be read or held; the others are, and the run ends with code 1. Times are medians on the device (on the host if its queue has no timestamps); the JSON result has all of them, with bytes \
 and ratios. Each stage of the construction is compared with the rate at which the device copies memory: the bytes that the stage has to read and \

@@ -67,6 +67,8 @@ pub struct Summary {
     pub bad: Vec<(u32, Fault)>,
     /// Bounds of the valid tetrahedra, relative to the mesh's origin.
     pub bounds: Bounds,
+    /// Whether cells of the tree are smaller where there are more tetrahedra.
+    pub graded: bool,
     /// Level of the leaves.
     pub level: u32,
     /// Level that alpha or the options ask for.

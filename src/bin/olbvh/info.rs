@@ -102,7 +102,7 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, solid: &Solid, s: &Su
         "topology_ms": s.topology_ms,
         "neighbour_bytes": s.neighbour_bytes,
         "tree": {
-            "l": s.level, "l_wanted": s.wanted, "alpha": tree.level.is_none().then_some(single(tree.alpha)), "level": tree.level,
+            "graded": s.graded, "l": s.level, "l_wanted": s.wanted, "alpha": tree.level.is_none().then_some(single(tree.alpha)), "level": tree.level,
             "assign": tree.assign.name(), "lists": tree.lists.name(), "budget": tree.budget,
             "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves, "bytes": arrays, "paper_bytes": s.paper_bytes, "build_ms": s.build_ms,
             "stages_ms": s.stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect::<serde_json::Map<_, _>>(),
@@ -191,6 +191,9 @@ fn add_tree(page: &mut Page, args: &Args, device: &str, s: &Summary) {
     let asked = args.tree.level.map_or_else(|| format!("α = {} asks for", single(args.tree.alpha)), |_| "--level asks for".to_owned());
     let clipped =
         if s.wanted > s.level { format!(" (a tree of level {}, which {asked}, would be too large)", s.wanted) } else { String::new() };
+    if s.graded {
+        page.row("cells", "smaller where the tetrahedra crowd (graded grid)");
+    }
     page.row("level of the leaves, l", format_args!("{}{clipped}", s.level));
     page.row("entries, n_m", grouped(s.entries));
     page.row("nodes, n_n", grouped(s.nodes));

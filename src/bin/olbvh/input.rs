@@ -185,7 +185,7 @@ fn refused(path: &Path, error: Error) -> Failure {
         Error::Invalid(why) => wrong(why),
         Error::TooLarge(why) if !path.exists() => wrong(why),
         Error::Io { source, .. } if source.kind() == ErrorKind::NotFound && text.contains(':') => Failure::Input(format!(
-            "{text}: neither a file nor a procedural mesh, which are kuhn:NX,NY,NZ, graded:N, shell:N and slivers:N"
+            "{text}: neither a file nor a procedural mesh, which are kuhn:NX,NY,NZ, graded:N, far-field:N, shell:N and slivers:N"
         )),
         _ => Failure::input(error),
     }

@@ -27,7 +27,7 @@ use std::process::ExitCode;
 
 const AFTER_HELP: &str = "\
 MESH is a file: .vtu, .vts, .vtr or .vti, .pvtu, .vtm or .pvd with the files that it lists, .vtk, .msh (Gmsh), .mesh or .meshb (Medit), .node or .ele (TetGen), .inp (Abaqus, CalculiX), .veg (Vega FEM), .tet (Isaac Gym); or a procedural mesh: kuhn:NX,NY,NZ, a grid of \
-NX×NY×NZ unit cubes of six tetrahedra each, with a scalar field, or graded:N, shell:N, slivers:N (see `olbvh bench --help`). Lengths are in the \
+NX×NY×NZ unit cubes of six tetrahedra each, with a scalar field, or graded:N, far-field:N, shell:N, slivers:N (see `olbvh bench --help`). Lengths are in the \
 units of the mesh.
 
 Examples:

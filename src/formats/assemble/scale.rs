@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::Assembly;
 use crate::formats::array::Array;
 use crate::formats::source::excerpt;
+use crate::mesh::{Mesh, valid_grid};
 
 /// A field with a smaller range than this part of its largest value has less than 256 different values.
 const NARROW: f32 = 1.0 / 65536.0;
@@ -14,8 +15,11 @@ const MOST_WHOLE: f32 = 16_777_216.0;
 
 /// How much of its volume a cell may gain or lose by rounding before it is remarked on.
 const CHANGE: f64 = 0.02;
-/// Cells smaller than this part of the mesh are small: the smallest leaves, of 1/1024, may have hundreds of them.
+/// Cells smaller than this part of the mesh are small: the smallest leaves, of 1/1024 unless the grid is graded, may have
+/// hundreds of them.
 const SMALL: f64 = 1.0 / 8192.0;
+/// The same as a part of the smallest leaves.
+const SMALL_IN_LEAF: f32 = 1.0 / 8.0;
 /// Up to this many small cells make no long lists.
 const LEAST_SMALL: usize = 4096;
 /// Cells with less of the volume of their box than this are nearly flat; small distances change them much.
@@ -49,7 +53,8 @@ impl Assembly {
         let add = |a: (usize, usize, u32), b: (usize, usize, u32)| (a.0 + b.0, a.1 + b.1, a.2.min(b.2));
         let (small, changed, first) = self.tets.par_iter().zip(&self.ids).map(count).reduce(|| (0, 0, u32::MAX), add);
         let all = self.tets.len();
-        let slow = (small > LEAST_SMALL && 2 * small > all).then(|| {
+        let too_many = |small: usize| small > LEAST_SMALL && 2 * small > all;
+        let slow = (too_many(small) && too_many(self.small_in_leaves(rounded))).then(|| {
             format!(
                 "{small} of {all} tetrahedra are smaller than 1/{} of the mesh, so many of them share a leaf of the tree, and queries are \
                  slow; cut the mesh into pieces, or remove parts that lie far away",
@@ -63,6 +68,21 @@ impl Assembly {
             )
         });
         slow.into_iter().chain(wrong).collect()
+    }
+}
+
+impl Assembly {
+    /// How many cells are small beside the smallest leaves at their place.
+    fn small_in_leaves(&self, rounded: &[[f32; 3]]) -> usize {
+        let mesh = Mesh::new(rounded.to_vec(), self.tets.clone());
+        let grid = valid_grid(&mesh);
+        let is_small = |tet: &&[u32; 4]| {
+            (0..3).all(|c| {
+                let at = tet.map(|v| grid.in_cells(c, rounded[v as usize][c] - grid.lo[c]));
+                at.into_iter().fold(f32::MIN, f32::max) - at.into_iter().fold(f32::MAX, f32::min) < SMALL_IN_LEAF
+            })
+        };
+        mesh.tets.par_iter().filter(is_small).count()
     }
 }
 

@@ -50,6 +50,7 @@ impl Engine for Cpu {
             counts: topology.counts,
             bad: topology.bad,
             bounds: (&tree.grid).into(),
+            graded: tree.grid.graded != 0,
             level: tree.grid.level,
             wanted,
             entries: tree.p.len() as u64,

@@ -72,6 +72,7 @@ impl Engine for Device {
             },
             bad: bad.into_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect(),
             bounds: tree.grid().into(),
+            graded: tree.grid().graded != 0,
             level: built.level,
             wanted: built.wanted_level,
             entries: u64::from(built.entries),
