@@ -136,19 +136,19 @@ vec3 olbvh_in_cells(olbvh_Grid g, vec3 d) {
     precise vec3 q = d * g.inv.xyz;
     if (g.graded == 0u) return q;
     precise vec3 sum = vec3(0.0);
-    for (uint i = 0u; i < olbvh_STRETCHES; ++i) {
+    [[dont_unroll]] for (uint i = 0u; i < olbvh_STRETCHES; ++i) {
         precise vec3 part = (d - olbvh_knot(i).xyz) * olbvh_rate(i).xyz;
         sum = sum + clamp(part, vec3(0.0), vec3(float(olbvh_STRETCH_CELLS)));
     }
     return sum;
 }
 
-// Where the lower side of a cell of the finest grid is in a graded grid: its distance from the lower corner.
-float olbvh_graded_side(uint c, uint k) {
-    uint i = min(k / olbvh_STRETCH_CELLS, olbvh_STRETCHES - 1u);
-    float from = olbvh_knot(i)[c];
-    precise float width = (olbvh_knot(i + 1u)[c] - from) * olbvh_two_to(-6);
-    precise float at = from + width * float(k - i * olbvh_STRETCH_CELLS);
+// Where the lower sides of a cell of the finest grid are in a graded grid: their distances from the lower corner.
+vec3 olbvh_graded_sides(uvec3 k) {
+    uvec3 i = k / olbvh_STRETCH_CELLS, j = min(i + 1u, olbvh_STRETCHES);
+    vec3 from = vec3(olbvh_knot(i.x).x, olbvh_knot(i.y).y, olbvh_knot(i.z).z);
+    precise vec3 width = (vec3(olbvh_knot(j.x).x, olbvh_knot(j.y).y, olbvh_knot(j.z).z) - from) * olbvh_two_to(-6);
+    precise vec3 at = from + width * vec3(k % olbvh_STRETCH_CELLS);
     return at;
 }
 
@@ -595,37 +595,48 @@ void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights 
 // Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in
 // src/reference/assign.rs. Needs grid.glsl.
 
-// The lower side of a cell of the finest grid, if the grid is graded.
-float olbvh_normalised_side(olbvh_Grid g, uint c, uint k) {
-    precise float unit = olbvh_graded_side(c, k) * g.scale;
-    precise float whole = floor(olbvh_canonical(unit) * olbvh_two_to(82)) * olbvh_two_to(-42);
-    return whole;
-}
+struct olbvh_CellShape {
+    vec3 centre;
+    vec3 half_size;
+};
 
-// Half the size of a cell of a level; in grids that are not graded, all of a level have the same.
-vec3 olbvh_half_cell(olbvh_Grid g, uint level, uvec3 cell) {
-    precise vec3 part = g.extent.xyz * olbvh_two_to(-1 - int(level));
+// Half the size of the cells of a level, unless the grid is graded.
+vec3 olbvh_half_cell(olbvh_Grid g, uint level) {
+    precise vec3 cell = g.extent.xyz * olbvh_two_to(-1 - int(level));
     precise vec3 whole = g.extent.xyz * 0.5;
-    vec3 h = vec3(g.inv.x == 0.0 ? whole.x : part.x, g.inv.y == 0.0 ? whole.y : part.y, g.inv.z == 0.0 ? whole.z : part.z);
-    if (g.graded == 0u) return h;
-    for (uint c = 0u; c < 3u; ++c) {
-        if (g.inv[c] == 0.0) continue;
-        uint shift = olbvh_MAX_LEVEL - level;
-        precise float size = olbvh_normalised_side(g, c, (cell[c] + 1u) << shift) - olbvh_normalised_side(g, c, cell[c] << shift);
-        h[c] = size * 0.5;
-    }
-    return h;
+    return vec3(g.inv.x == 0.0 ? whole.x : cell.x, g.inv.y == 0.0 ? whole.y : cell.y, g.inv.z == 0.0 ? whole.z : cell.z);
 }
 
-// The centre of a cell of a level, with its half size.
-vec3 olbvh_cell_centre(olbvh_Grid g, uint level, vec3 h, uvec3 cell) {
+// The multiple of 2^-42 below x.
+vec3 olbvh_whole_steps(vec3 x) {
+    precise vec3 r = floor(x * olbvh_two_to(42)) * olbvh_two_to(-42);
+    return r;
+}
+
+// The centre of a cell of this half size, unless the grid is graded.
+vec3 olbvh_cell_centre(vec3 h, uvec3 cell) {
     precise vec3 a = vec3(2u * cell + 1u) * h;
-    for (uint c = 0u; c < 3u && g.graded != 0u; ++c) {
-        precise float middle = olbvh_normalised_side(g, c, cell[c] << (olbvh_MAX_LEVEL - level)) + h[c];
-        if (g.inv[c] != 0.0) a[c] = middle;
-    }
-    precise vec3 b = floor(a * olbvh_two_to(42)) * olbvh_two_to(-42);
-    return b;
+    return olbvh_whole_steps(a);
+}
+
+// The lower sides of a cell of the finest grid, if the grid is graded.
+vec3 olbvh_normalised_sides(olbvh_Grid g, uvec3 k) {
+    precise vec3 unit = olbvh_graded_sides(k) * g.scale;
+    unit = vec3(olbvh_canonical(unit.x), olbvh_canonical(unit.y), olbvh_canonical(unit.z));
+    precise vec3 r = floor(unit * olbvh_two_to(82)) * olbvh_two_to(-42);
+    return r;
+}
+
+// A cell of a level in any grid.
+olbvh_CellShape olbvh_cell_shape(olbvh_Grid g, uint level, uvec3 cell) {
+    vec3 h = olbvh_half_cell(g, level);
+    if (g.graded == 0u) return olbvh_CellShape(olbvh_cell_centre(h, cell), h);
+    uint shift = olbvh_MAX_LEVEL - level;
+    vec3 lower = olbvh_normalised_sides(g, cell << shift);
+    precise vec3 size = olbvh_normalised_sides(g, (cell + 1u) << shift) - lower;
+    h = mix(0.5 * size, h, equal(g.inv.xyz, vec3(0.0)));
+    precise vec3 middle = lower + h; // of a flat axis, too, whose lower side is 0
+    return olbvh_CellShape(olbvh_whole_steps(middle), h);
 }
 
 const uint olbvh_EVERYTHING = 0xff00u; // A slab that contains every point.
@@ -638,12 +649,12 @@ struct olbvh_SlabCell {
 
 // Reciprocals of the half sizes of a leaf's cell (leaves of a graded grid have no slabs), 0 on axes that normalised coordinates are too coarse for.
 vec3 olbvh_slab_scale(olbvh_Grid g) {
-    vec3 h = olbvh_half_cell(g, g.level, uvec3(0u)), r;
+    vec3 h = olbvh_half_cell(g, g.level), r;
     for (uint c = 0u; c < 3u; ++c) r[c] = g.extent[c] < olbvh_two_to(-30) ? 0.0 : olbvh_reciprocal(h[c]);
     return r;
 }
 
-olbvh_SlabCell olbvh_slab_cell(olbvh_Grid g, vec3 scale, uvec3 cell) { return olbvh_SlabCell(olbvh_cell_centre(g, g.level, olbvh_half_cell(g, g.level, cell), cell), scale); }
+olbvh_SlabCell olbvh_slab_cell(olbvh_Grid g, vec3 scale, uvec3 cell) { return olbvh_SlabCell(olbvh_cell_centre(olbvh_half_cell(g, g.level), cell), scale); }
 
 vec3 olbvh_in_cell(olbvh_SlabCell cell, vec3 x) {
     precise vec3 y = (x - cell.centre) * cell.inverse;
@@ -891,12 +902,6 @@ bool olbvh_stride_to(inout uint t, vec3 x, uint most) {
     return owner != olbvh_NONE;
 }
 
-// The cell of a leaf, in normalised coordinates.
-struct olbvh_LeafCell {
-    vec3 centre;
-    vec3 half_size;
-};
-
 uint olbvh_star[olbvh_STAR];
 uint olbvh_star_size;
 
@@ -989,7 +994,7 @@ uint olbvh_walk_leg(uint t, vec3 a, vec3 b, out uint left) {
 }
 
 // Point number k of the cell; the first is its centre.
-vec3 olbvh_cell_point(olbvh_LeafCell cell, uint k) {
+vec3 olbvh_cell_point(olbvh_CellShape cell, uint k) {
     vec3 olbvh_p;
     for (uint c = 0u; c < 3u; ++c) {
         precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * olbvh_two_to(-23) - 1.0;
@@ -1004,7 +1009,7 @@ vec3 olbvh_cell_point(olbvh_LeafCell cell, uint k) {
 // Walks to a point x of a cell that is full of mesh, from its seed: directly, through up to ARRIVALS stars, then by
 // DETOURS points. The owner may be in another part of the first star, so x counts as in a gap only after the second.
 // All of it is one loop, so that a kernel contains each part only once.
-olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_LeafCell cell, vec3 x) {
+olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_CellShape cell, vec3 x) {
     olbvh_Best best = olbvh_no_best();
     uint t = seed, s = 0u;
     [[dont_unroll]] for (uint way = 0u; way < olbvh_ARRIVALS + olbvh_DETOURS && !(way < olbvh_ARRIVALS ? best.inside : olbvh_settled(best)); ++way) {
@@ -1034,11 +1039,8 @@ uint olbvh_middle_of(uvec2 range) { return olbvh_listed_tet(range.x + (range.y -
 
 // The owner of the point `at`, x in normalised coordinates, in a leaf that is full of mesh, found by a whole walk.
 olbvh_Best olbvh_walked_through(olbvh_Grid g, uvec2 range, vec3 at, vec3 x) {
-    olbvh_LeafCell cell;
-    uvec3 of_leaf = olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level);
-    cell.half_size = olbvh_half_cell(g, g.level, of_leaf);
-    cell.centre = olbvh_cell_centre(g, g.level, cell.half_size, of_leaf);
-    return olbvh_walk_from_seed(olbvh_listed_tet(range.x), cell, x);
+    uvec3 cell = olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level);
+    return olbvh_walk_from_seed(olbvh_listed_tet(range.x), olbvh_cell_shape(g, g.level, cell), x);
 }
 
 // The owner of x in a leaf with these entries, found by a stride from the middle of the list or, if that fails and the
@@ -1270,24 +1272,24 @@ bool olbvh_traverse(uint level) {
 }
 // Box of a cell in the units of the mesh (SPEC 2.1). Twin of `cell_box` in src/reference/leaves.rs.
 
-float olbvh_cell_side(olbvh_Grid g, uint c, uint level, uint k) {
-    if (k == 0u) return g.lo[c];
-    if (k == 1u << level || g.inv[c] == 0.0) return g.hi[c];
-    precise float extent = g.hi[c] - g.lo[c];
-    precise float along = float(k) * olbvh_two_to(-int(level));
-    precise float offset = olbvh_canonical(extent) * along;
-    if (g.graded != 0u) offset = olbvh_graded_side(c, k << (olbvh_MAX_LEVEL - level));
-    precise float x = g.lo[c] + offset;
-    return olbvh_canonical(x);
+// The lower sides of cell k of a level; k may be one beyond the last cell.
+vec3 olbvh_cell_sides(olbvh_Grid g, uint level, uvec3 k) {
+    precise vec3 extent = g.hi.xyz - g.lo.xyz;
+    precise vec3 along = vec3(k) * olbvh_two_to(-int(level));
+    precise vec3 offset = vec3(olbvh_canonical(extent.x), olbvh_canonical(extent.y), olbvh_canonical(extent.z)) * along;
+    if (g.graded != 0u) offset = olbvh_graded_sides(k << (olbvh_MAX_LEVEL - level));
+    precise vec3 x = g.lo.xyz + offset;
+    x = vec3(olbvh_canonical(x.x), olbvh_canonical(x.y), olbvh_canonical(x.z));
+    x = mix(x, g.hi.xyz, equal(k, uvec3(1u << level)));
+    x = mix(x, g.hi.xyz, equal(g.inv.xyz, vec3(0.0)));
+    return mix(x, g.lo.xyz, equal(k, uvec3(0u)));
 }
 
 // Lower and upper corner of the cell with this Morton code.
 void olbvh_cell_box(olbvh_Grid g, uint level, uint code, out vec3 lo, out vec3 hi) {
     uvec3 k = olbvh_unmorton(code);
-    for (uint c = 0u; c < 3u; ++c) {
-        lo[c] = olbvh_cell_side(g, c, level, k[c]);
-        hi[c] = olbvh_cell_side(g, c, level, k[c] + 1u);
-    }
+    lo = olbvh_cell_sides(g, level, k);
+    hi = olbvh_cell_sides(g, level, k + 1u);
 }
 
 // Traverses the tree. Returns false if it has too many nodes to visit in one call (24,000 internal nodes).

@@ -71,9 +71,8 @@ impl Grid {
     /// Where the lower side of cell `k` of the finest grid is along axis `c`, if the grid is graded: its distance from the
     /// lower corner.
     pub fn graded_side(&self, c: usize, k: u32) -> f32 {
-        let i = (k / STRETCH_CELLS).min(STRETCHES - 1);
-        let [from, to] = [i, i + 1].map(|i| self.knots[i as usize][c]);
-        from + ((to - from) * two_to(-6)) * (k - i * STRETCH_CELLS) as f32
+        let [from, to] = [0, 1].map(|j| self.knots[(k / STRETCH_CELLS + j).min(STRETCHES) as usize][c]);
+        from + ((to - from) * two_to(-6)) * (k % STRETCH_CELLS) as f32
     }
 
     /// `x` in normalised coordinates, in which the lower corner of the bounds is at 0 and the largest extent is in

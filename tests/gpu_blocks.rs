@@ -304,7 +304,7 @@ fn far(gpu: &Gpu, mesh: &Mesh) {
 fn passed_over(gpu: &Gpu) {
     let mut mesh = kuhn_jittered([14, 13, 12], 0.15, 5).unwrap();
     let top = (0..mesh.tets.len()).find(|&t| mesh.tets[t].iter().all(|&v| mesh.points[v as usize][2] > 10.5)).unwrap();
-    mesh.tets.extend(vec![mesh.tets[top]; 11_000]);
+    mesh.tets.extend(vec![mesh.tets[top]; 20_000]);
     let ask = |at| {
         let settings = SliceSettings { at: Some(at), thickness: Some(0.5), size: [20, 20], ..SliceSettings::default() };
         let voxels = &settings.voxels([0.0; 3], [14.0, 13.0, 12.0], mesh.origin).unwrap();
@@ -345,13 +345,13 @@ fn drawn(gpu: &Gpu, mesh: &Mesh) {
         let (whole, took) = render(gpu, 64 << 20, &asked, SILENT).unwrap().into_parts();
         let bad = took.bad_cells;
         assert!(took.trees == 1 && bad[0] > 0);
-        let memory = 448 << 10;
+        let memory = 384 << 10;
         let (found, took) = render(gpu, memory, &asked, SILENT).unwrap().into_parts();
         println!("{camera}: {} samples, {} trees, peak {}", found.rendered.stats.found_samples, took.trees, took.peak);
         let first = (0..whole.rendered.colors.len()).find(|&i| bits(&whole.rendered.colors[i]) != bits(&found.rendered.colors[i]));
         assert_eq!(first.map(|i| (i % 41, i / 41, whole.rendered.colors[i], found.rendered.colors[i])), None, "{camera}");
         assert!(whole.rendered.colors.iter().filter(|c| c[3] > 0.1).count() > 150, "{camera}");
-        assert!(took.trees > 2 && took.peak <= memory && took.bad_cells == bad, "{} trees, {} bytes", took.trees, took.peak);
+        assert!(took.trees > 4 && took.peak <= memory && took.bad_cells == bad, "{} trees, {} bytes", took.trees, took.peak);
     }
 }
 

@@ -17,6 +17,7 @@ RECORDS(3, uvec4, cells)
 BUFFER(4, readonly, uint, bad)
 #include "shared/positions.glsl"
 #include "shared/bad.glsl"
+#include "shared/mix_bits.glsl"
 
 const uint SAMPLES = 256u; // Tetrahedra that are looked at.
 const uint PLACES = 2u * SAMPLES; // As many even places as those of tetrahedra.
@@ -41,7 +42,7 @@ float divide_1024(float e) {
         scale -= 1;
     }
     uint quotient = 0u;
-    for (int i = 0; i < 25; ++i) { // 24 bits, and one for rounding
+    [[dont_unroll]] for (int i = 0; i < 25; ++i) { // 24 bits, and one for rounding
         quotient = quotient << 1 | uint(remainder >= divisor);
         if (remainder >= divisor) remainder -= divisor;
         remainder <<= 1;
@@ -62,21 +63,14 @@ float place_of(uint k, vec4 corners, float lo) {
     return max(canonical(away), 0.0);
 }
 
-// Twin of `hash` in src/mesh/kuhn.rs.
-uint hash(uint x) {
-    x = (x ^ x >> 16) * 0x7feb352du;
-    x = (x ^ x >> 15) * 0x846ca68bu;
-    return x ^ x >> 16;
-}
-
 void take_sample(uint k, vec3 lo, vec3 extent) {
     uint each = tets / SAMPLES;
-    uint t = k * each + k * (tets % SAMPLES) / SAMPLES + (each == 0u ? 0u : hash(k) % each);
+    uint t = k * each + k * (tets % SAMPLES) / SAMPLES + (each == 0u ? 0u : mix_bits(k) % each);
     bool ok = !is_bad(t);
     vec3 v[4];
     uvec4 ids = ok ? words(cells.at[t]) : uvec4(0u);
     for (uint i = 0u; i < 4u && ok; ++i) v[i] = position(ids[i], stride);
-    for (uint c = 0u; c < 3u; ++c) {
+    [[dont_unroll]] for (uint c = 0u; c < 3u; ++c) {
         places[c][2u * k] = ok ? place_of(k, vec4(v[0][c], v[1][c], v[2][c], v[3][c]), lo[c]) : NOWHERE;
         precise float even = extent[c] * (float(k) * two_to(-8));
         places[c][2u * k + 1u] = even;
@@ -85,27 +79,27 @@ void take_sample(uint k, vec3 lo, vec3 extent) {
 
 // Finds the quantiles that place k is.
 void rank_place(uint k) {
-    for (uint c = 0u; c < 3u; ++c) {
+    [[dont_unroll]] for (uint c = 0u; c < 3u; ++c) {
         float own = places[c][k];
         uint rank = 0u, valid = 0u;
-        for (uint i = 0u; i < PLACES; ++i) {
+        [[dont_unroll]] for (uint i = 0u; i < PLACES; ++i) {
             float other = places[c][i];
             rank += uint(other < own || (other == own && i < k));
             valid += uint(other < NOWHERE);
         }
-        for (uint j = 1u; j < STRETCHES; ++j) {
+        [[dont_unroll]] for (uint j = 1u; j < STRETCHES; ++j) {
             if (own < NOWHERE && rank == j * valid / STRETCHES) quantiles[c][j] = own;
         }
     }
 }
 
-float quantile(uint c, uint j, float extent) { return j == 0u ? 0.0 : j == STRETCHES ? extent : min(quantiles[c][j], extent); }
+float quantile(uint c, uint j, float extent) { return j == 0u ? 0.0 : j >= STRETCHES ? extent : min(quantiles[c][j], extent); }
 
 // Whether a quarter of the stretches between quantiles are less than a quarter as wide as even ones.
 bool is_steep(uint c, float extent) {
     precise float narrow = extent * two_to(-6);
     uint count = 0u;
-    for (uint j = 0u; j < STRETCHES; ++j) {
+    [[dont_unroll]] for (uint j = 0u; j < STRETCHES; ++j) {
         precise float width = quantile(c, j + 1u, extent) - quantile(c, j, extent);
         count += uint(width < narrow);
     }
@@ -117,7 +111,7 @@ float knot_at(uint c, uint j, float extent, bool steep) {
     precise float even = extent * (float(j) * two_to(-4));
     precise float part = quantile(c, j, extent) * (1.0 - two_to(-6));
     precise float moved = part + even * two_to(-6);
-    return j == STRETCHES ? extent : steep ? moved : even;
+    return j >= STRETCHES ? extent : steep ? moved : even;
 }
 
 void main() {
@@ -133,42 +127,43 @@ void main() {
     barrier();
     for (uint k = local_index(); any_cell && k < PLACES; k += WORKGROUP) rank_place(k);
     barrier();
+    const float MIN_EXTENT = uintBitsToFloat((127u - 103u) << 23);
+    float largest = MIN_EXTENT;
+    vec3 inv = vec3(0.0);
+    bvec3 steep = bvec3(false);
+    [[dont_unroll]] for (uint c = 0u; c < 3u; ++c) {
+        largest = max(largest, extent[c]);
+        if (extent[c] < MIN_EXTENT) continue;
+        inv[c] = divide_1024(extent[c]);
+        steep[c] = is_steep(c, extent[c]);
+    }
+    for (uint j = local_index(); j <= STRETCHES; j += WORKGROUP) {
+        vec4 begin = vec4(0.0), rates = vec4(0.0);
+        [[dont_unroll]] for (uint c = 0u; c < 3u && any(steep); ++c) {
+            if (inv[c] == 0.0) continue;
+            begin[c] = knot_at(c, j, extent[c], steep[c]);
+            precise float width = knot_at(c, j + 1u, extent[c], steep[c]) - begin[c];
+            precise float rate = divide_1024(width) * two_to(-4); // STRETCH_CELLS / width
+            rates[c] = rate;
+        }
+        grid.at[0].knots[j] = begin;
+        if (j < STRETCHES) grid.at[0].rates[j] = rates;
+    }
     if (local_index() > 0u) return;
     Grid g;
     g.lo = vec4(lo, 0.0);
-    g.hi = vec4(hi, 0.0);
-    g.inv = vec4(0.0);
-    g.extent = vec4(0.0);
-    g.graded = 0u;
-    const float MIN_EXTENT = uintBitsToFloat((127u - 103u) << 23);
-    float largest = MIN_EXTENT;
-    bvec3 steep = bvec3(false);
-    for (uint c = 0u; any_cell && c < 3u; ++c) {
-        largest = max(largest, extent[c]);
-        if (extent[c] < MIN_EXTENT) continue;
-        g.inv[c] = divide_1024(extent[c]);
-        steep[c] = is_steep(c, extent[c]);
-        g.graded |= uint(steep[c]);
-    }
     uint exponent = floatBitsToUint(largest) >> 23;
     g.scale = uintBitsToFloat((254u - exponent) << 23);
-    g.level = MAX_LEVEL;
-    g.first_leaf = 0u;
-    g.slabs = 0u;
-    g.longest = 0u;
-    g.pad = 0u;
-    g.ids = NONE;
-    g.extent = vec4(normalise(g, g.hi.xyz), 0.0);
-    for (uint j = 0u; j <= STRETCHES; ++j) g.knots[j] = vec4(0.0);
-    for (uint j = 0u; j < STRETCHES; ++j) g.rates[j] = vec4(0.0);
-    for (uint c = 0u; c < 3u && g.graded != 0u; ++c) {
-        if (g.inv[c] == 0.0) continue;
-        for (uint j = 0u; j <= STRETCHES; ++j) g.knots[j][c] = knot_at(c, j, extent[c], steep[c]);
-        for (uint j = 0u; j < STRETCHES; ++j) {
-            precise float width = g.knots[j + 1u][c] - g.knots[j][c];
-            precise float rate = divide_1024(width) * two_to(-4); // STRETCH_CELLS / width
-            g.rates[j][c] = rate;
-        }
-    }
-    grid.at[0] = g;
+    grid.at[0].lo = g.lo;
+    grid.at[0].hi = vec4(hi, 0.0);
+    grid.at[0].inv = vec4(inv, 0.0);
+    grid.at[0].extent = vec4(normalise(g, hi), 0.0);
+    grid.at[0].scale = g.scale;
+    grid.at[0].level = MAX_LEVEL;
+    grid.at[0].first_leaf = 0u;
+    grid.at[0].ids = NONE;
+    grid.at[0].slabs = 0u;
+    grid.at[0].longest = 0u;
+    grid.at[0].graded = uint(any(steep));
+    grid.at[0].pad = 0u;
 }

@@ -33,14 +33,14 @@ const uint MAX_LIST_FOR_OCTANTS = 16384u; // Leaves with longer lists get a mask
 
 // Whether one of the first MAX_TOUCH_TESTS tetrahedra of a leaf touches its cell.
 bool touched(Grid g, uint begin, uint end, uint code) {
-    uvec3 cell = unmorton(code);
-    vec3 h = half_cell(g, g.level, cell), centre = cell_centre(g, g.level, h, cell);
+    CellShape cell = cell_shape(g, g.level, unmorton(code));
+    vec3 h = cell.half_size;
     vec3 axes[3] = vec3[3](vec3(h.x, 0.0, 0.0), vec3(0.0, h.y, 0.0), vec3(0.0, 0.0, h.z));
     for (uint i = begin; i < min(end, begin + MAX_TOUCH_TESTS); ++i) {
         uvec4 ids = words(cells.at[p.at[i]]);
         Tet t = load_tet(ids);
         vec3 v[4];
-        for (uint k = 0u; k < 4u; ++k) v[k] = difference(t.v[k], centre);
+        for (uint k = 0u; k < 4u; ++k) v[k] = difference(t.v[k], cell.centre);
         if (box_touches(v, axes, vec3(0.0))) return true;
     }
     return false;

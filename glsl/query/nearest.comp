@@ -42,9 +42,8 @@ vec3 x; // the point in normalised coordinates
 // which tetrahedra are assigned, since their sides in units of the mesh are rounded by more where that is far from 0.
 float node_square(Node node) {
     Grid g = grid.at[0];
-    uvec3 cell = unmorton(node.code);
-    vec3 h = half_cell(g, node.level, cell);
-    precise vec3 apart = abs(difference(cell_centre(g, node.level, h, cell), x)) - h;
+    CellShape cell = cell_shape(g, node.level, unmorton(node.code));
+    precise vec3 apart = abs(difference(cell.centre, x)) - cell.half_size;
     precise vec3 d = max(apart * two_to(-21) - 2.0, vec3(0.0));
     return dot_product(d, d);
 }

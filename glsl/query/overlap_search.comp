@@ -43,15 +43,16 @@ bool touches_node(Node node) {
     precise vec3 scaled = f.half_size.xyz * part;
     vec3 size = vec3(f.flat_axis.x == 0.0 ? scaled.x : f.half_size.x, f.flat_axis.y == 0.0 ? scaled.y : f.half_size.y,
                      f.flat_axis.z == 0.0 ? scaled.z : f.half_size.z);
-    uvec3 cell = unmorton(node.code), shift = uvec3(MAX_LEVEL - node.level);
+    uvec3 cell = unmorton(node.code);
     precise vec3 away = vec3(2u * cell + 1u) * size;
-    for (uint c = 0u; c < 3u && g.graded != 0u; ++c) {
-        float lower = graded_side(c, cell[c] << shift[c]), upper = graded_side(c, (cell[c] + 1u) << shift[c]);
+    if (g.graded != 0u) {
+        uint shift = MAX_LEVEL - node.level;
+        vec3 lower = graded_sides(cell << shift), upper = graded_sides((cell + 1u) << shift);
         precise float unit = f.scale * two_to(39);
-        precise float length = (upper - lower) * unit, twice = (upper + lower) * unit;
-        if (f.flat_axis[c] != 0.0) continue;
-        size[c] = length;
-        away[c] = twice;
+        precise vec3 length = (upper - lower) * unit, twice = (upper + lower) * unit;
+        bvec3 is_flat = notEqual(f.flat_axis.xyz, vec3(0.0));
+        size = mix(length, size, is_flat);
+        away = mix(twice, away, is_flat);
     }
     precise vec3 at = f.corner.xyz + away;
     precise vec3 centre = floor(at * two_to(42)) * two_to(-42);

@@ -109,12 +109,9 @@ void enter_node(Node node, uint mask, uint first_child) {
     marked = flags.at[word] >> shift;
     if (shift + bitCount(mask) > 32u) marked |= flags.at[word + 1u] << (32u - shift);
     uvec3 k = 2u * unmorton(node.code);
-    vec3 side[3];
-    for (uint c = 0u; c < 3u; ++c) {
-        for (uint i = 0u; i < 3u; ++i) side[i][c] = cell_side(g, c, node.level + 1u, k[c] + i);
-    }
-    lower = slabs_of(side[0], side[1]);
-    upper = slabs_of(side[1], side[2]);
+    vec3 middle = cell_sides(g, node.level + 1u, k + 1u);
+    lower = slabs_of(cell_sides(g, node.level + 1u, k), middle);
+    upper = slabs_of(middle, cell_sides(g, node.level + 1u, k + 2u));
 }
 #define ENTER_NODE(node, mask, first_child) enter_node(node, mask, first_child)
 

@@ -5,7 +5,6 @@
 const uint EXACT = 2u;
 
 struct Filter {
-    vec3 h; // half a cell, not inflated
     vec3 normal[4];
     vec3 at[4];
     float limit[4];
@@ -24,8 +23,7 @@ vec3 inflated(Grid g, vec3 h) {
 // For cells with half size h.
 Filter make_filter(Tet t, Grid g, vec3 h, uint assign) {
     Filter f;
-    f.h = h;
-    vec3 box_half = inflated(g, f.h);
+    vec3 box_half = inflated(g, h);
     precise vec3 size = max(max(t.v[0], t.v[1]), max(t.v[2], t.v[3])) - min(min(t.v[0], t.v[1]), min(t.v[2], t.v[3]));
     precise vec3 slack = (size + 2.0 * box_half) * two_to(-18) + two_to(-42);
     float vol = volume(t);

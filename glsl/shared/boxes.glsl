@@ -1,21 +1,21 @@
 // Box of a cell in the units of the mesh (SPEC 2.1). Twin of `cell_box` in src/reference/leaves.rs.
 
-float cell_side(Grid g, uint c, uint level, uint k) {
-    if (k == 0u) return g.lo[c];
-    if (k == 1u << level || g.inv[c] == 0.0) return g.hi[c];
-    precise float extent = g.hi[c] - g.lo[c];
-    precise float along = float(k) * two_to(-int(level));
-    precise float offset = canonical(extent) * along;
-    if (g.graded != 0u) offset = graded_side(c, k << (MAX_LEVEL - level));
-    precise float x = g.lo[c] + offset;
-    return canonical(x);
+// The lower sides of cell k of a level; k may be one beyond the last cell.
+vec3 cell_sides(Grid g, uint level, uvec3 k) {
+    precise vec3 extent = g.hi.xyz - g.lo.xyz;
+    precise vec3 along = vec3(k) * two_to(-int(level));
+    precise vec3 offset = vec3(canonical(extent.x), canonical(extent.y), canonical(extent.z)) * along;
+    if (g.graded != 0u) offset = graded_sides(k << (MAX_LEVEL - level));
+    precise vec3 x = g.lo.xyz + offset;
+    x = vec3(canonical(x.x), canonical(x.y), canonical(x.z));
+    x = mix(x, g.hi.xyz, equal(k, uvec3(1u << level)));
+    x = mix(x, g.hi.xyz, equal(g.inv.xyz, vec3(0.0)));
+    return mix(x, g.lo.xyz, equal(k, uvec3(0u)));
 }
 
 // Lower and upper corner of the cell with this Morton code.
 void cell_box(Grid g, uint level, uint code, out vec3 lo, out vec3 hi) {
     uvec3 k = unmorton(code);
-    for (uint c = 0u; c < 3u; ++c) {
-        lo[c] = cell_side(g, c, level, k[c]);
-        hi[c] = cell_side(g, c, level, k[c] + 1u);
-    }
+    lo = cell_sides(g, level, k);
+    hi = cell_sides(g, level, k + 1u);
 }

@@ -3,17 +3,10 @@
 // the table. (The smallest vertex of a face would not do: a vertex before all its neighbours is that of all its faces,
 // which its slots cannot hold.) The including kernel declares cells, table, status, branches, slots and near_slots.
 #include "shared/mates.glsl"
+#include "shared/mix_bits.glsl"
 
 const uint NEAR_PROBES = 16u;
 const uint MAX_PROBES = 8192u;
-
-uint mix_bits(uint h) {
-    h ^= h >> 16;
-    h *= 0x7feb352du;
-    h ^= h >> 15;
-    h *= 0x846ca68bu;
-    return h ^ (h >> 16);
-}
 
 // The vertices of face f (opposite to vertex f) in ascending order.
 uvec3 face_of(uvec4 v, uint f) {

@@ -41,19 +41,19 @@ vec3 in_cells(Grid g, vec3 d) {
     precise vec3 q = d * g.inv.xyz;
     if (g.graded == 0u) return q;
     precise vec3 sum = vec3(0.0);
-    for (uint i = 0u; i < STRETCHES; ++i) {
+    [[dont_unroll]] for (uint i = 0u; i < STRETCHES; ++i) {
         precise vec3 part = (d - knot(i).xyz) * rate(i).xyz;
         sum = sum + clamp(part, vec3(0.0), vec3(float(STRETCH_CELLS)));
     }
     return sum;
 }
 
-// Where the lower side of a cell of the finest grid is in a graded grid: its distance from the lower corner.
-float graded_side(uint c, uint k) {
-    uint i = min(k / STRETCH_CELLS, STRETCHES - 1u);
-    float from = knot(i)[c];
-    precise float width = (knot(i + 1u)[c] - from) * two_to(-6);
-    precise float at = from + width * float(k - i * STRETCH_CELLS);
+// Where the lower sides of a cell of the finest grid are in a graded grid: their distances from the lower corner.
+vec3 graded_sides(uvec3 k) {
+    uvec3 i = k / STRETCH_CELLS, j = min(i + 1u, STRETCHES);
+    vec3 from = vec3(knot(i.x).x, knot(i.y).y, knot(i.z).z);
+    precise vec3 width = (vec3(knot(j.x).x, knot(j.y).y, knot(j.z).z) - from) * two_to(-6);
+    precise vec3 at = from + width * vec3(k % STRETCH_CELLS);
     return at;
 }
 

@@ -12,11 +12,8 @@ uint middle_of(uvec2 range) { return listed_tet(range.x + (range.y - range.x) / 
 
 // The owner of the point `at`, x in normalised coordinates, in a leaf that is full of mesh, found by a whole walk.
 Best walked_through(Grid g, uvec2 range, vec3 at, vec3 x) {
-    LeafCell cell;
-    uvec3 of_leaf = quantize(g, at) >> (MAX_LEVEL - g.level);
-    cell.half_size = half_cell(g, g.level, of_leaf);
-    cell.centre = cell_centre(g, g.level, cell.half_size, of_leaf);
-    return walk_from_seed(listed_tet(range.x), cell, x);
+    uvec3 cell = quantize(g, at) >> (MAX_LEVEL - g.level);
+    return walk_from_seed(listed_tet(range.x), cell_shape(g, g.level, cell), x);
 }
 
 // The owner of x in a leaf with these entries, found by a stride from the middle of the list or, if that fails and the

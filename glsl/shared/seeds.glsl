@@ -9,7 +9,7 @@ struct Centres {
 };
 
 // The centre of a cell of the tree's level.
-vec3 centre_of(Grid g, uvec3 cell) { return cell_centre(g, g.level, half_cell(g, g.level, cell), cell); }
+vec3 centre_of(Grid g, uvec3 cell) { return cell_shape(g, g.level, cell).centre; }
 
 Centres centres_of(Tet tet, Grid g, CellBox box) {
     vec3 lo = min(min(tet.v[0], tet.v[1]), min(tet.v[2], tet.v[3])), hi = max(max(tet.v[0], tet.v[1]), max(tet.v[2], tet.v[3]));

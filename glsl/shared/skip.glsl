@@ -14,10 +14,11 @@ bool is_visible_node(uint node) { return (flags.at[plan.visible_at + (node >> 5u
 uint sample_behind(Grid g, vec3 origin, vec3 direction, vec3 inverse_direction, uint k, uint end, uvec3 finest, uint level) {
     uint shift = MAX_LEVEL - level;
     uvec3 cell = finest >> shift;
+    vec3 sides = cell_sides(g, level, cell + uvec3(greaterThan(inverse_direction, vec3(0.0))));
     float leave = 3.40282347e38;
     for (uint c = 0u; c < 3u; ++c) {
         if (g.inv[c] == 0.0) continue;
-        precise float t = (cell_side(g, c, level, cell[c] + uint(inverse_direction[c] > 0.0)) - origin[c]) * inverse_direction[c];
+        precise float t = (sides[c] - origin[c]) * inverse_direction[c];
         leave = min(leave, t);
     }
     precise float number = leave * view.inverse_step - 0.5;

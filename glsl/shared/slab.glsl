@@ -12,12 +12,12 @@ struct SlabCell {
 
 // Reciprocals of the half sizes of a leaf's cell (leaves of a graded grid have no slabs), 0 on axes that normalised coordinates are too coarse for.
 vec3 slab_scale(Grid g) {
-    vec3 h = half_cell(g, g.level, uvec3(0u)), r;
+    vec3 h = half_cell(g, g.level), r;
     for (uint c = 0u; c < 3u; ++c) r[c] = g.extent[c] < two_to(-30) ? 0.0 : reciprocal(h[c]);
     return r;
 }
 
-SlabCell slab_cell(Grid g, vec3 scale, uvec3 cell) { return SlabCell(cell_centre(g, g.level, half_cell(g, g.level, cell), cell), scale); }
+SlabCell slab_cell(Grid g, vec3 scale, uvec3 cell) { return SlabCell(cell_centre(half_cell(g, g.level), cell), scale); }
 
 vec3 in_cell(SlabCell cell, vec3 x) {
     precise vec3 y = (x - cell.centre) * cell.inverse;

@@ -6,9 +6,10 @@ uint touching(Tet tet, Grid g, uint assign, CellBox box, uvec3 at, uint bits) {
     uint kept = 0u;
     for (uint bit = 1u; bit != 0u && bit <= bits; bit <<= 1) {
         if ((bits & bit) != 0u) {
-            if (!made || g.graded != 0u) f = make_filter(tet, g, half_cell(g, g.level, at), assign);
+            CellShape cell = cell_shape(g, g.level, at);
+            if (!made || g.graded != 0u) f = make_filter(tet, g, cell.half_size, assign);
             made = true;
-            if (touches(f, cell_centre(g, g.level, f.h, at))) kept |= bit;
+            if (touches(f, cell.centre)) kept |= bit;
         }
         at = next_candidate(box, at);
     }

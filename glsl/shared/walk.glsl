@@ -15,13 +15,8 @@ const uint ROUND = STAR;
 // rounding, and the nearest tetrahedron owns it.
 const float GAP = -7.62939453125e-6;
 
+#include "shared/centre.glsl"
 #include "shared/stride.glsl"
-
-// The cell of a leaf, in normalised coordinates.
-struct LeafCell {
-    vec3 centre;
-    vec3 half_size;
-};
 
 uint star[STAR];
 uint star_size;
@@ -115,7 +110,7 @@ uint walk_leg(uint t, vec3 a, vec3 b, out uint left) {
 }
 
 // Point number k of the cell; the first is its centre.
-vec3 cell_point(LeafCell cell, uint k) {
+vec3 cell_point(CellShape cell, uint k) {
     vec3 p;
     for (uint c = 0u; c < 3u; ++c) {
         precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * two_to(-23) - 1.0;
@@ -130,7 +125,7 @@ vec3 cell_point(LeafCell cell, uint k) {
 // Walks to a point x of a cell that is full of mesh, from its seed: directly, through up to ARRIVALS stars, then by
 // DETOURS points. The owner may be in another part of the first star, so x counts as in a gap only after the second.
 // All of it is one loop, so that a kernel contains each part only once.
-Best walk_from_seed(uint seed, LeafCell cell, vec3 x) {
+Best walk_from_seed(uint seed, CellShape cell, vec3 x) {
     Best best = no_best();
     uint t = seed, s = 0u;
     [[dont_unroll]] for (uint way = 0u; way < ARRIVALS + DETOURS && !(way < ARRIVALS ? best.inside : settled(best)); ++way) {

@@ -69,9 +69,7 @@ impl Assembly {
         });
         slow.into_iter().chain(wrong).collect()
     }
-}
 
-impl Assembly {
     /// How many cells are small beside the smallest leaves at their place.
     fn small_in_leaves(&self, rounded: &[[f32; 3]]) -> usize {
         let mesh = Mesh::new(rounded.to_vec(), self.tets.clone());
