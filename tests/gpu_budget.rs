@@ -215,7 +215,7 @@ fn every_capacity() {
         let step = if other || std::env::var_os("OLBVH_TEST_VALIDATION").is_some() { 13 } else { 1 };
         let most = (0..=deepest).map(&entries).max().unwrap();
         let rooms: Vec<u32> = (tets..most + 10).step_by(step).collect();
-        let mut built_levels = vec![0; trees.len()];
+        let (mut built_levels, mut leapt) = (vec![0; trees.len()], 0);
         for rooms in rooms.chunks(128) {
             let carve = |a: &mut Arena| {
                 let one = |&room: &u32| {
@@ -244,7 +244,12 @@ fn every_capacity() {
             let mut end = 0;
             for (Built { tree: t, owners }, &room) in built.iter().zip(rooms) {
                 let status: BuildStatus = one(&content, t.status);
-                let level = (0..=deepest).rev().find(|&l| entries(l) <= room).unwrap();
+                // By its entries, only as many levels are tried as it takes if each has a quarter of the entries.
+                let tried = (0..).find(|k| room << (2 * k) >= candidates(deepest)).map_or(0, |k| deepest.saturating_sub(k));
+                let lowest = if by_entries { tried } else { 0 };
+                let fitting = (lowest..=deepest).rev().find(|&l| entries(l) <= room);
+                let level = fitting.or_else(|| (0..lowest).rev().find(|&l| candidates(l) <= room)).unwrap();
+                leapt += u32::from(fitting.is_none());
                 assert_eq!((status.overflow, status.level), (0, level), "{lists} {room} {by_entries}");
                 assert!(arrays(&content, t, &status) == trees[level as usize], "{lists} {room}");
                 assert_eq!(content[owners.offset() as usize / 4..][..expected.len()], expected, "{lists} {room}");
@@ -261,6 +266,7 @@ fn every_capacity() {
         // With lists of the boundary, a coarser level can have more entries than the next finer one.
         let built = (0..=deepest).filter(|&l| built_levels[l as usize] > 0).count();
         assert!(built > 2 && (by_entries || built == trees.len()), "{built_levels:?}");
+        assert_eq!(leapt > 0, by_entries, "{leapt} trees whose level's candidates fit");
     }
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");

@@ -23,8 +23,8 @@ const uint SAMPLES = 256u; // Tetrahedra that are looked at.
 const uint PLACES = 2u * SAMPLES; // As many even places as those of tetrahedra.
 const float NOWHERE = 3.40282347e38;
 
-shared float places[3][PLACES]; // distances from the lower corner, NOWHERE for a bad tetrahedron
-shared float quantiles[3][STRETCHES];
+shared float places[3][PLACES]; // distances from the lower corner, NOWHERE for a bad tetrahedron; sorted later
+shared uint bad_samples;
 
 float from_ordered(uint key) { return uintBitsToFloat(unordered(key)); }
 
@@ -67,6 +67,7 @@ void take_sample(uint k, vec3 lo, vec3 extent) {
     uint each = tets / SAMPLES;
     uint t = k * each + k * (tets % SAMPLES) / SAMPLES + (each == 0u ? 0u : mix_bits(k) % each);
     bool ok = !is_bad(t);
+    if (!ok) atomicAdd(bad_samples, 1u);
     vec3 v[4];
     uvec4 ids = ok ? words(cells.at[t]) : uvec4(0u);
     for (uint i = 0u; i < 4u && ok; ++i) v[i] = position(ids[i], stride);
@@ -77,23 +78,26 @@ void take_sample(uint k, vec3 lo, vec3 extent) {
     }
 }
 
-// Finds the quantiles that place k is.
-void rank_place(uint k) {
-    [[dont_unroll]] for (uint c = 0u; c < 3u; ++c) {
-        float own = places[c][k];
-        uint rank = 0u, valid = 0u;
-        [[dont_unroll]] for (uint i = 0u; i < PLACES; ++i) {
-            float other = places[c][i];
-            rank += uint(other < own || (other == own && i < k));
-            valid += uint(other < NOWHERE);
-        }
-        [[dont_unroll]] for (uint j = 1u; j < STRETCHES; ++j) {
-            if (own < NOWHERE && rank == j * valid / STRETCHES) quantiles[c][j] = own;
+// Sorts the places of all axes at once, by a bitonic network.
+void sort_places() {
+    [[dont_unroll]] for (uint run = 2u; run <= PLACES; run *= 2u) {
+        [[dont_unroll]] for (uint apart = run / 2u; apart > 0u; apart /= 2u) {
+            for (uint k = local_index(); k < 3u * PLACES / 2u; k += WORKGROUP) {
+                uint c = k / (PLACES / 2u), pair = k % (PLACES / 2u);
+                uint i = 2u * pair - pair % apart, j = i + apart; // i has no bit of `apart`
+                float a = places[c][i], b = places[c][j];
+                bool falls = (i & run) != 0u;
+                places[c][i] = falls ? max(a, b) : min(a, b);
+                places[c][j] = falls ? min(a, b) : max(a, b);
+            }
+            barrier();
         }
     }
 }
 
-float quantile(uint c, uint j, float extent) { return j == 0u ? 0.0 : j >= STRETCHES ? extent : min(quantiles[c][j], extent); }
+float quantile(uint c, uint j, float extent) {
+    return j == 0u ? 0.0 : j >= STRETCHES ? extent : min(places[c][j * (PLACES - bad_samples) / STRETCHES], extent);
+}
 
 // Whether a quarter of the stretches between quantiles are less than a quarter as wide as even ones.
 bool is_steep(uint c, float extent) {
@@ -123,10 +127,11 @@ void main() {
         precise float d = hi[c] - lo[c];
         extent[c] = canonical(d);
     }
+    if (local_index() == 0u) bad_samples = 0u;
+    barrier();
     for (uint k = local_index(); any_cell && k < SAMPLES; k += WORKGROUP) take_sample(k, lo, extent);
     barrier();
-    for (uint k = local_index(); any_cell && k < PLACES; k += WORKGROUP) rank_place(k);
-    barrier();
+    sort_places();
     const float MIN_EXTENT = uintBitsToFloat((127u - 103u) << 23);
     float largest = MIN_EXTENT;
     vec3 inv = vec3(0.0);

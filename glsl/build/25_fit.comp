@@ -1,7 +1,7 @@
 #version 460
 // Codes, filter 4, where counts stay on the device: checks whether the entries that the filter kept fit. If they do
-// not, the next coarser level is counted and filtered. Such an attempt lies between every two dispatches of this
-// kernel; its dispatches are empty once the entries fit.
+// not, the next coarser level is counted and filtered, or, in the last attempt, a level whose entries are sure to fit.
+// Such an attempt lies between every two dispatches of this kernel; its dispatches are empty once the entries fit.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
@@ -10,6 +10,7 @@ ARGUMENTS(8)
     uint tets;
     uint capacity; // most entries
     uint first;    // not 0: no attempt has been made yet
+    uint last;     // not 0: the attempt that follows is the last one
 END_ARGUMENTS
 GRID(0, READ_WRITE)
 BUFFER(1, READ_WRITE, BuildStatus, status)
@@ -23,6 +24,9 @@ BUFFER(6, READ_WRITE, uint, live)   // tets + 1 if there is an attempt, else 0
 BUFFER(7, writeonly, uint, groups)
 #include "shared/groups.glsl"
 
+// Whether the candidates of a level fit, which are never fewer than its entries.
+bool surely_fits(uint level) { return status.at[0].total[2u * level] <= capacity && status.at[0].total[2u * level + 1u] == 0u; }
+
 void main() {
     if (item_index() > 0u) return;
     bool filtered = first != 0u || live.at[0] > 0u;
@@ -34,6 +38,7 @@ void main() {
     bool again = filtered && entries.at[0] > capacity && level > 0u;
     if (again) {
         --level;
+        while (last != 0u && level > 0u && !surely_fits(level)) --level;
         grid.at[0].level = level;
         status.at[0].level = level;
         status.at[0].candidates = status.at[0].total[2u * level];

@@ -59,19 +59,23 @@ impl Build<'_> {
     pub fn fit(&self, r: &mut Recorder<'_>, capacity: &Capacity) -> Result<()> {
         let Some((filter, coarser)) = self.filter.and_then(|f| Some((f, f.coarser?))) else { return Ok(()) };
         let (Self { grid, status, counts, .. }, tets) = (*self, self.mesh.input.tets);
+        let attempts = capacity.attempts();
         let CoarserScratch { live, groups, shares: tried_shares, entries: tried_entries } = coarser;
-        let (shares, entries, capacity, levels) = (counts.total, filter.entries, capacity.entries, capacity.level);
-        let fit = Fit { grid, status, shares, entries, tried_shares, tried_entries, live, groups, tets, capacity, first: 1 };
+        let (shares, entries, capacity) = (counts.total, filter.entries, capacity.entries);
+        let fit = |attempt: u32| {
+            let (first, last) = (u32::from(attempt == 0), u32::from(attempt + 1 == attempts));
+            Fit { grid, status, shares, entries, tried_shares, tried_entries, live, groups, tets, capacity, first, last }
+        };
         let spec = FitSpec { workgroup: r.gpu().subgroup_size(), each: r.gpu().target().each, ..Default::default() };
         let over = Over { total: tried_shares, coarser: Some(coarser), marks: self.marks() };
         r.stage("build.fit", |r| {
             r.barrier("codes.scan → fit");
-            r.dispatch(&fit, spec, Groups::Count(1))?;
-            for _ in 0..levels {
+            r.dispatch(&fit(0), spec, Groups::Count(1))?;
+            for attempt in 1..=attempts {
                 r.barrier("fit → codes.count");
                 self.count_candidates(r, over)?;
                 self.filter_candidates(r, filter, over)?;
-                r.dispatch(&Fit { first: 0, ..fit }, spec, Groups::Count(1))?;
+                r.dispatch(&fit(attempt), spec, Groups::Count(1))?;
             }
             r.barrier("fit → codes.emit");
             Ok(())

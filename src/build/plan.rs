@@ -21,8 +21,8 @@ pub struct Capacity {
     pub candidates: u32,
     /// Entries of the chosen assignment and lists. Where there is room for fewer entries than candidates, a recorded
     /// build filters and counts, then goes to the next coarser level until the entries fit. This records up to 17
-    /// dispatches for each level down to the root's, which are empty once they fit. One entry per tetrahedron is enough
-    /// for a tree over any mesh.
+    /// dispatches for each of a few levels, which are empty once they fit, and as many for a level whose candidates fit,
+    /// in case that none of these did. One entry per tetrahedron is enough for a tree over any mesh.
     pub entries: u32,
     /// Nodes.
     pub nodes: u32,
@@ -69,6 +69,13 @@ impl Capacity {
             if size(middle).is_ok_and(|needed| needed <= bytes) { fits = middle } else { beyond = middle }
         }
         Ok(Self::for_entries(fits, level))
+    }
+
+    /// The coarser levels that a recorded build may filter. On all but the last one the entries may still be too many;
+    /// one level up, a surface meets a quarter of the cells.
+    pub(crate) fn attempts(&self) -> u32 {
+        let quartered = |k: &u32| u64::from(self.entries.max(1)) << (2 * k) >= u64::from(self.candidates);
+        (0..self.level).find(quartered).map_or(self.level, |k| k + 1)
     }
 
     /// Rejects sizes that shaders cannot number.

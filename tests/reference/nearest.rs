@@ -5,7 +5,7 @@ use super::slice::wide;
 use super::{ALPHAS, prepared, tree};
 use olbvh::layout::NONE;
 use olbvh::mesh::cases::{Case, cases};
-use olbvh::mesh::{kuhn, kuhn_jittered};
+use olbvh::mesh::{far_field, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::reference::build::build;
 use olbvh::reference::nearest::Surface;
@@ -54,8 +54,9 @@ fn the_surface_of_a_box() {
 #[test]
 fn no_tree_misses_the_closest_place() {
     let jittered = Case { name: "jittered", mesh: kuhn_jittered([5, 4, 3], 0.3, 3).unwrap() };
+    let graded = Case { name: "far field", mesh: far_field(8).unwrap() };
     let mut measured = 0;
-    for Case { name, mesh } in cases().unwrap().into_iter().chain([jittered]).filter(|case| case.mesh.tets.len() < 2000) {
+    for Case { name, mesh } in cases().unwrap().into_iter().filter(|case| case.mesh.tets.len() < 2000).chain([jittered, graded]) {
         let (mesh, topology) = prepared(mesh);
         let at_surface = |&t: &u32| topology.is_valid(t) && topology.neighbours[t as usize].contains(&NONE);
         let boundary: Vec<u32> = (0..mesh.tets.len() as u32).filter(at_surface).collect();
