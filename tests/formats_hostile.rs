@@ -4,17 +4,19 @@
 #![allow(clippy::unwrap_used, clippy::format_push_string, clippy::format_collect)] // also in helpers of tests
 #![allow(unsafe_code)] // a global allocator that counts cannot be written otherwise
 
-mod formats_small;
+#[allow(dead_code, reason = "it uses little of it")]
+#[path = "formats/small/mod.rs"]
+mod small;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
 
-use formats_small::not_run::not_run;
-use formats_small::shared;
 use olbvh::Error;
 use olbvh::formats::{Fate, LoadOptions, Loaded, load, load_bytes};
+use small::not_run::not_run;
+use small::shared;
 
 static NOW: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);

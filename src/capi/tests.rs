@@ -1,6 +1,6 @@
 //! Tests of the recording functions, called as a C host calls them.
 
-#[path = "../../tests/host/mod.rs"]
+#[path = "../../tests/gpu/host/mod.rs"]
 mod host;
 mod pictures;
 mod plans;
