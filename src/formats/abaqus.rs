@@ -1,15 +1,17 @@
 //! Reader for input files of Abaqus and CalculiX (`.inp`): nodes and elements, of the model or of parts and their
 //! instances. All else, such as materials, loads and steps, is passed over.
 
+mod model;
+
 use std::collections::HashMap;
 use std::path::PathBuf;
 
 use super::LoadOptions;
-use super::abaqus_model::{Block, Body, Element, Instance, Model};
 use super::assemble::Assembly;
 use super::source::{Source, excerpt};
 use super::tokens::{Tokens, parse_float, parse_integer};
 use crate::error::Result;
+use model::{Block, Body, Element, Instance, Model};
 
 /// Most files within each other.
 const MOST_DEEP: usize = 8;

@@ -1,19 +1,23 @@
 //! Reader for Gmsh files (`.msh`), versions 2.0–2.2, 4.0 and 4.1, text and binary of either byte order, with node and
 //! element data.
 
+mod data;
+mod elements;
+mod reader;
+
 use std::collections::HashMap;
 
 use super::array::Array;
 use super::assemble::Assembly;
-use super::gmsh_data::{View, keep_step};
-use super::gmsh_elements::{Elements, kinds};
-use super::gmsh_reader::{Reader, Version, old};
 use super::scalar::Scalar;
 use super::source::{Source, excerpt};
 use super::tags::Tags;
 use super::{LoadOptions, TimeStep};
 use crate::error::Result;
 use crate::mesh::On;
+use data::{View, keep_step};
+use elements::{Elements, kinds};
+use reader::{Reader, Version, old};
 
 #[derive(Default)]
 struct Content {

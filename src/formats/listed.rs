@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::detect::{Format, READABLE, detect};
 use super::source::{Source, ending};
-use super::vtu_parser::{Document, parse};
-use super::{TimeStep, abaqus, vtk_series};
+use super::vtu::parser::{Document, parse};
+use super::{TimeStep, abaqus, vtk};
 
 /// Most files that a list and the lists in it may name.
 pub(super) const MOST_FILES: usize = 1 << 16;
@@ -39,7 +39,7 @@ fn named(path: &Path, is_input: bool) -> Vec<PathBuf> {
         return abaqus::included(&source);
     }
     match detect(&source) {
-        Ok(Format::Series) => vtk_series::files(&source),
+        Ok(Format::Series) => vtk::series::files(&source),
         Ok(Format::VtkXml) => match parse(&source, TimeStep::Last) {
             Ok(Document::List(list)) => list.files.iter().map(|file| source.beside(&file.path)).collect(),
             _ => Vec::new(),

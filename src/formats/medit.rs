@@ -1,4 +1,6 @@
-//! Reader for Medit meshes in text form (`.mesh`). `meditb` reads the binary form.
+//! Reader for Medit meshes in text form (`.mesh`). `binary` reads the binary form.
+
+pub(super) mod binary;
 
 use super::LoadOptions;
 use super::array::Array;

@@ -13,7 +13,6 @@
 //! memory.
 
 mod abaqus;
-mod abaqus_model;
 mod array;
 mod assemble;
 mod budget;
@@ -21,16 +20,12 @@ mod cells;
 mod curved;
 mod detect;
 mod gmsh;
-mod gmsh_data;
-mod gmsh_elements;
-mod gmsh_reader;
 mod integers;
 mod isaac;
 mod lattice;
 mod listed;
 mod loss;
 mod medit;
-mod meditb;
 mod npy;
 mod points;
 mod procedural;
@@ -46,15 +41,7 @@ mod tokens;
 mod unpack;
 mod vega;
 mod vtk;
-mod vtk_attributes;
-mod vtk_reader;
-mod vtk_series;
 mod vtu;
-mod vtu_data;
-mod vtu_faces;
-mod vtu_files;
-mod vtu_outline;
-mod vtu_parser;
 mod write;
 
 use std::path::Path;
@@ -179,11 +166,11 @@ fn assembled(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let companion;
     match detect::detect(source)? {
         Format::VtkXml => vtu::read(source, options),
-        Format::Series => vtk_series::read(source, options),
+        Format::Series => vtk::series::read(source, options),
         Format::VtkLegacy => vtk::read(source, options),
         Format::Gmsh => gmsh::read(source, options),
         Format::Medit => medit::read(source, options),
-        Format::MeditBinary => meditb::read(source, options),
+        Format::MeditBinary => medit::binary::read(source, options),
         Format::TetGen => {
             companion = tetgen::companion(source)?;
             tetgen::read(source, &companion, options)

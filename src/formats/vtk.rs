@@ -1,5 +1,9 @@
 //! Reader for legacy VTK files (`.vtk`), versions 1.0 to 5.1, text and binary (big-endian).
 
+mod attributes;
+mod reader;
+pub(super) mod series;
+
 use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
@@ -11,10 +15,10 @@ use super::report::Fate;
 use super::scalar::Scalar;
 use super::source::{Source, excerpt};
 use super::tokens::{Tokens, parse_float};
-use super::vtk_attributes::Section;
-use super::vtk_reader::Reader;
 use crate::error::Result;
 use crate::mesh::On;
+use attributes::Section;
+use reader::Reader;
 
 /// The cells as stored in the file.
 struct Cells<'a> {

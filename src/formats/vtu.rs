@@ -1,5 +1,11 @@
 //! Reader for VTK XML grids (`.vtu`, `.vts`, `.vtr`, `.vti`), versions 0.1 to 2.x, and for files that list such grids.
-//! `vtu_parser` reads the structure, `vtu_data` the arrays, `vtu_faces` polyhedra; `vtu_files` opens what is listed.
+//! `parser` reads the structure, `data` the arrays, `faces` polyhedra; `files` opens what is listed.
+
+mod data;
+mod faces;
+mod files;
+mod outline;
+pub(super) mod parser;
 
 use std::collections::HashMap;
 
@@ -12,12 +18,12 @@ use super::lattice::{GridKind, Lattice};
 use super::loss::Loss;
 use super::report::Fate;
 use super::source::{Source, excerpt};
-use super::vtu_data::Codec;
-use super::vtu_faces::Faces;
-use super::vtu_files::{Files, Grid, Origin, grids};
-use super::vtu_parser::Piece;
 use crate::error::Result;
 use crate::mesh::On;
+use data::Codec;
+use faces::Faces;
+use files::{Files, Grid, Origin, grids};
+use parser::Piece;
 
 /// Reads a mesh from a grid, or from the grids that the file lists, which are taken as pieces of one.
 pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {

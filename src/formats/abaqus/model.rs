@@ -4,12 +4,12 @@ use std::collections::{HashMap, HashSet};
 
 use glam::{DQuat, DVec3};
 
-use super::array::Array;
-use super::assemble::Assembly;
-use super::cells::{CellType, vtk};
-use super::report::Fate;
-use super::source::Source;
-use super::tags::Tags;
+use super::super::array::Array;
+use super::super::assemble::Assembly;
+use super::super::cells::{CellType, vtk};
+use super::super::report::Fate;
+use super::super::source::Source;
+use super::super::tags::Tags;
 use crate::error::Result;
 use crate::mesh::On;
 

@@ -1,10 +1,10 @@
 //! The faces of polyhedra in VTK XML unstructured grids, which older and newer versions of VTK store differently.
 
-use super::assemble::Assembly;
-use super::integers::Integers;
-use super::source::Source;
-use super::vtu_data::{Codec, StoredArray};
-use super::vtu_parser::Piece;
+use super::super::assemble::Assembly;
+use super::super::integers::Integers;
+use super::super::source::Source;
+use super::data::{Codec, StoredArray};
+use super::parser::Piece;
 use crate::error::Result;
 
 /// The faces of the polyhedra of a piece.

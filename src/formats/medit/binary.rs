@@ -1,11 +1,11 @@
 //! Reader for binary Medit meshes (`.meshb`), versions 1 to 4, either byte order.
 
-use super::LoadOptions;
-use super::assemble::Assembly;
-use super::medit::{Content, SECTIONS};
-use super::scalar::{Number, Scalar};
-use super::source::Source;
-use super::tokens::Tokens;
+use super::super::LoadOptions;
+use super::super::assemble::Assembly;
+use super::super::scalar::{Number, Scalar};
+use super::super::source::Source;
+use super::super::tokens::Tokens;
+use super::{Content, SECTIONS};
 use crate::error::Result;
 
 const DIMENSION: i64 = 3;

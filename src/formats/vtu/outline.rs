@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::source::Source;
-use super::tokens::Tokens;
+use super::super::source::Source;
+use super::super::tokens::Tokens;
 use crate::error::Result;
 use memchr::{memchr, memchr2, memchr3};
 

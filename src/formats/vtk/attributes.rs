@@ -1,10 +1,10 @@
 //! Reader for the arrays of legacy VTK files.
 
-use super::loss::Loss;
-use super::scalar::Scalar;
-use super::source::excerpt;
-use super::tokens::parse_integer;
-use super::vtk_reader::Reader;
+use super::super::loss::Loss;
+use super::super::scalar::Scalar;
+use super::super::source::excerpt;
+use super::super::tokens::parse_integer;
+use super::reader::Reader;
 use crate::error::Result;
 use crate::mesh::On;
 

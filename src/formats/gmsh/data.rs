@@ -1,12 +1,12 @@
 //! Reader for `$NodeData` and `$ElementData` of Gmsh files.
 
-use super::TimeStep;
-use super::array::Array;
-use super::budget::Budget;
-use super::gmsh_reader::Reader;
-use super::loss::Loss;
-use super::source::{Source, excerpt};
-use super::tags::Tags;
+use super::super::TimeStep;
+use super::super::array::Array;
+use super::super::budget::Budget;
+use super::super::loss::Loss;
+use super::super::source::{Source, excerpt};
+use super::super::tags::Tags;
+use super::reader::Reader;
 use crate::error::Result;
 use crate::mesh::On;
 use std::collections::{BTreeSet, HashMap};

@@ -6,13 +6,13 @@ use std::ops::Range;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-use super::lattice::{Frame, GridKind, Lattice};
-use super::scalar::Scalar;
-use super::source::{Source, excerpt, passage};
-use super::steps::{Steps, TimeStep};
-use super::tokens::{Tokens, parse_float};
-use super::vtu_data::{Appended, Codec, Place, StoredArray};
-use super::vtu_outline::Outline;
+use super::super::lattice::{Frame, GridKind, Lattice};
+use super::super::scalar::Scalar;
+use super::super::source::{Source, excerpt, passage};
+use super::super::steps::{Steps, TimeStep};
+use super::super::tokens::{Tokens, parse_float};
+use super::data::{Appended, Codec, Place, StoredArray};
+use super::outline::Outline;
 use crate::error::{Error, Result};
 
 /// What a file contains.

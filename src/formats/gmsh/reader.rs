@@ -1,9 +1,9 @@
 //! Reader for the numbers in all sections of Gmsh files: as text or binary, in the version and byte order that the
 //! first section states.
 
-use super::scalar::{Number, Scalar};
-use super::source::{Source, excerpt};
-use super::tokens::Tokens;
+use super::super::scalar::{Number, Scalar};
+use super::super::source::{Source, excerpt};
+use super::super::tokens::Tokens;
 use crate::error::{Error, Result};
 
 /// A version of the format.

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::assemble::Assembly;
-use super::detect::{Format, READABLE, detect};
-use super::source::{Source, excerpt};
-use super::{LoadOptions, TimeStep, assembled};
+use super::super::assemble::Assembly;
+use super::super::detect::{Format, READABLE, detect};
+use super::super::source::{Source, excerpt};
+use super::super::{LoadOptions, TimeStep, assembled};
 use crate::error::Result;
 
 #[derive(serde::Deserialize)]
@@ -28,12 +28,12 @@ fn entries(source: &Source) -> Result<(Vec<Entry>, std::borrow::Cow<'_, [u8]>)> 
 }
 
 /// The files of all steps.
-pub(super) fn files(source: &Source) -> Vec<PathBuf> {
+pub(in crate::formats) fn files(source: &Source) -> Vec<PathBuf> {
     entries(source).map(|(entries, _)| entries.iter().map(|entry| source.beside(&entry.name)).collect()).unwrap_or_default()
 }
 
 /// Reads the file of one step, in whatever format it is.
-pub(super) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
+pub(in crate::formats) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let (entries, text) = entries(source)?;
     let mut steps: Vec<(f64, &str)> = entries.iter().zip(0..).map(|(e, i)| (e.time.unwrap_or(f64::from(i)), e.name.as_str())).collect();
     // Of several files at one time, the last counts, as in ParaView.

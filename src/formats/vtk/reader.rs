@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use super::integers::Integers;
-use super::scalar::{Number, Scalar};
-use super::source::{Source, excerpt};
-use super::stored::{Content, Stored};
-use super::tokens::{Tokens, parse_float, parse_integer};
+use super::super::integers::Integers;
+use super::super::scalar::{Number, Scalar};
+use super::super::source::{Source, excerpt};
+use super::super::stored::{Content, Stored};
+use super::super::tokens::{Tokens, parse_float, parse_integer};
 use crate::error::Result;
 
 /// Position in the file, and how its numbers are stored.

@@ -2,11 +2,11 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::cells::{self, CellType};
-use super::gmsh_reader::{Reader, Version};
-use super::scalar::Scalar;
-use super::source::{Source, excerpt};
-use super::tokens::parse_integer;
+use super::super::cells::{self, CellType};
+use super::super::scalar::Scalar;
+use super::super::source::{Source, excerpt};
+use super::super::tokens::parse_integer;
+use super::reader::{Reader, Version};
 use crate::error::Result;
 
 /// The elements as stored in the file.

@@ -9,13 +9,13 @@ use std::ops::Range;
 use base64::Engine as _;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
-use super::budget::Budget;
-use super::integers::Integers;
-use super::scalar::{Number, Scalar};
-use super::source::{Source, excerpt};
-use super::stored::{Blocks, Content, Stored};
-use super::tokens::{Tokens, parse_float, parse_integer};
-use super::unpack::Compressor;
+use super::super::budget::Budget;
+use super::super::integers::Integers;
+use super::super::scalar::{Number, Scalar};
+use super::super::source::{Source, excerpt};
+use super::super::stored::{Blocks, Content, Stored};
+use super::super::tokens::{Tokens, parse_float, parse_integer};
+use super::super::unpack::Compressor;
 use crate::error::{Error, Result};
 
 /// An array as described by the XML.

@@ -3,14 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::PathBuf;
 
-use super::budget::Budget;
-use super::lattice::GridKind;
-use super::listed::MOST_FILES;
-use super::source::ending;
-use super::source::{Source, excerpt};
-use super::vtu_data::Codec;
-use super::vtu_parser::{Document, List, Piece, Skeleton, parse};
-use super::{LoadOptions, TimeStep};
+use super::super::budget::Budget;
+use super::super::lattice::GridKind;
+use super::super::listed::MOST_FILES;
+use super::super::source::ending;
+use super::super::source::{Source, excerpt};
+use super::super::{LoadOptions, TimeStep};
+use super::data::Codec;
+use super::parser::{Document, List, Piece, Skeleton, parse};
 use crate::error::Result;
 
 /// Most lists within each other.
