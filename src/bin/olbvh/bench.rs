@@ -147,7 +147,7 @@ fn target(path: &Path, meshes: &[PathBuf]) -> Outcome<Target> {
 }
 
 fn write(path: &Path, target: &Target, report: &Report) -> Outcome {
-    let json = serde_json::to_string_pretty(report).map_err(|e| Failure::Failed(e.to_string()))? + "\n";
+    let json = serde_json::to_string(report).map_err(|e| Failure::Failed(e.to_string()))? + "\n";
     let files = match target {
         Target::File(OutputFormat::Md) => vec![(path.to_path_buf(), markdown(report))],
         Target::File(_) => vec![(path.to_path_buf(), json)],
