@@ -2,18 +2,18 @@
 //! It is the oracle of the tests, documents the algorithms, and runs `--device cpu`. It does not depend on Vulkan.
 
 pub mod assign;
-pub mod best_owner;
+pub(crate) mod best_owner;
 pub mod boundary;
 pub mod brute;
 pub mod build;
-pub mod codes;
+pub(crate) mod codes;
 pub mod corners;
 pub mod depth;
-pub mod leaf_walk;
+pub(crate) mod leaf_walk;
 pub mod leaves;
-pub mod levels;
+pub(crate) mod levels;
 pub mod locate;
-pub mod marks;
+pub(crate) mod marks;
 pub mod nearest;
 pub mod overlap;
 pub mod quarters;
@@ -21,7 +21,7 @@ pub mod ranges;
 pub mod separate;
 pub mod slabs;
 pub mod slice;
-pub mod sort;
+pub(crate) mod sort;
 pub mod splits;
 pub mod tet;
 pub mod traverse;
