@@ -145,65 +145,11 @@ void add(float at, vec4 color, vec3 n) {
     state.last_at = at;
 }
 
-// A place of the ray: its distance from the origin in steps, the field's value there, and the number of iso-values that
-// the value is not below.
-struct Place {
-    float at;
-    float value;
-    uint rank;
-};
+#include "query/volume_surfaces.glsl"
 
-Place place_at(float at, float value) {
-    uint rank = 0u;
-    for (uint i = 0u; i < 8u; ++i) rank += uint(i < view.isos && !(value < view.iso[i]));
-    return Place(at, value, rank);
-}
-
-Place place_beside(Place p, float steps, float rise) {
-    precise float at = p.at + steps;
-    precise float value = p.value + rise * steps;
-    return place_at(at, value);
-}
-
-// How far a straight way stays in a tetrahedron: the part of it, at most 1, from a point in the tetrahedron, whose
-// weights are `here`, to one whose weights are `there`.
-float way_within(vec4 here, vec4 there) {
-    float least = 1.0;
-    for (uint f = 0u; f < 4u; ++f) {
-        float part = there[f] < 0.0 ? way_before(here[f], there[f]) : 1.0;
-        if (part < least) least = part;
-    }
-    return least;
-}
-
-// The stretch of the ray around sample k, which has this value, in the tetrahedron of the sample, but no farther than to
-// the samples beside k: where it begins and ends, and the values there. If it joins the stretch of the sample before, it
-// begins at the sample: two such stretches usually meet at a face, so the value is linear between them.
-void find_ends(uint k, Sides here, float value, bool joins, out Place from, out Place to) {
-    precise float at = float(k) + 0.5;
-    from = to = place_at(at, value);
-    Sides next = sides_of(stand, normalise(grid.at[0], sample_at(view, origin, direction, k + 1u)));
-    precise float rise = value_of(held_values, barycentric(next)) - value;
-    if (!(abs(rise) < 1e37)) return;
-    if (!joins) {
-        precise vec4 change = next.w - here.w;
-        precise vec4 behind = here.w - change;
-        from = place_beside(from, -min(way_within(here.w, behind), at), rise);
-    }
-    to = place_beside(to, way_within(here.w, next.w), rise);
-}
-
-// Barycentric coordinates in the stand of a place of the ray, which lies in it but for rounding.
-vec4 barycentric_at(float steps) {
-    precise float s = steps * view.step_size;
-    precise vec3 at = origin + direction * s;
-    vec4 b = max(barycentric(sides_of(stand, normalise(grid.at[0], at))), vec4(0.0));
-    precise vec4 within = b * reciprocal(max((b.x + b.y) + (b.z + b.w), 1.0));
-    return within;
-}
-
-// The normal of sample k. The first one behind a surface, or behind what is transparent, has that of the place where the ray enters its tetrahedron, and
-// behind a clip that of the cut: at various depths, even surfaces would have rings. Twin of `Marcher::lit_at`.
+// The normal of sample k. The first one behind a surface, or behind what is transparent, has that of the place where the
+// ray enters its tetrahedron, and behind a clip that of the cut: at various depths, even surfaces would have rings. Twin
+// of `Marcher::lit_at`.
 vec3 normal_of_sample(uint k, Sides here, bool joins) {
     precise float at = float(k) + 0.5;
     if (joins) return beside_cut(at, normal_at(barycentric(here)));
@@ -214,21 +160,6 @@ vec3 normal_of_sample(uint k, Sides here, bool joins) {
     precise vec4 behind = here.w - change;
     precise float entry = max(at - way_within(here.w, behind), unclipped.x);
     return beside_cut(entry, normal_at(barycentric_at(entry)));
-}
-
-// Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip or a depth.
-// Light takes them to lie in the stand.
-void add_surfaces(Place from, Place to) {
-    bool rises = from.rank < to.rank;
-    for (uint i = from.rank; i != to.rank && sum.w < view.termination; i += rises ? 1u : ~0u) {
-        float iso = view.iso[rises ? i : i - 1u];
-        precise float rise = clamp(to.value - from.value, -1e37, 1e37);
-        precise float part = canonical(rise) == 0.0 ? 1.0 : clamp((iso - from.value) * reciprocal(rise), 0.0, 1.0);
-        precise float steps = from.at + (to.at - from.at) * part;
-        if (steps < unclipped.x || steps > unclipped.y) continue;
-        vec4 color = lookup(iso);
-        if (color.w > 0.0) add(steps, color, normal_at(barycentric_at(steps)));
-    }
 }
 
 // Whether the tree must first be asked how far nothing is visible.
@@ -292,6 +223,115 @@ void take(Sides sides) {
     add(float(k) + 0.5, color, SHADING != 0u ? normal_of_sample(k, sides, last != NONE) : vec3(0.0));
 }
 
+// Takes up the ray of a pixel.
+void begin_ray(uvec2 in_view, uint place) {
+    make_ray(view, in_view, origin, direction);
+    halfway = vec3(0.0);
+    if (SHADING != 0u) {
+        precise vec3 h = view.to_light.xyz - direction;
+        float square = max(dot_product(h, h), 1e-12);
+        precise vec3 unit = h * inverse_sqrt(square);
+        halfway = unit;
+    }
+    inverse_direction = inverse_of(direction);
+    if (ISO != 0u || SHADING != 0u) unclipped = kept_stretch(origin, direction, limit_of(in_view, place), cut);
+    ahead = 1u;
+}
+
+// Walks from the tetrahedron of the last sample, as long as it `stands` in one and for a burst of passes. A pass is one
+// sample, after one step if needed. Walks are not cut short, so that owners do not depend on when a ray has to wait.
+// Unless the ray `walks`, this is a single sample of a known owner.
+void walk(Grid g, bool walks, inout uint work, inout bool stands, inout bool is_owner) {
+    uint misses = 0u; // steps of the walk to the next sample
+    uint pass = 0u;
+    for (; (pass < BURST || misses > 0u) && (walks || is_owner) && stands && state.next < state.end && !is_to_look(); ++pass, ++work) {
+        vec3 x = normalise(g, sample_at(view, origin, direction, state.next));
+        Sides sides = sides_of(stand, x);
+        if (!sides.clear && !is_owner) {
+            stands = ++misses < WALK && go_on(sides);
+            if (stands) sides = sides_of(stand, x);
+        }
+        if (stands && (sides.clear || is_owner)) {
+            misses = 0u;
+            is_owner = false;
+            take(sides);
+        }
+    }
+}
+
+#ifndef BINARY_TREE
+// Asks the tree how far nothing is visible, and passes that.
+void look(Grid g, inout bool stands) {
+    bool hidden;
+    uint behind = stretch_end(g, origin, direction, inverse_direction, state.next, state.end, hidden);
+    if (!hidden) {
+        state.check = behind;
+    } else if (ISO != 0u) {
+        // The stretch lies on one side of every surface, so its first and its last sample are enough.
+        ahead = max(behind - state.next, 2u) - 1u;
+        state.check = state.next + 1u;
+    } else {
+        stands = stands && behind - state.next < WALK;
+        skipped += behind - state.next;
+        state.next = behind;
+        state.last = NONE; // as after a transparent sample
+    }
+}
+#endif
+
+// Follows the ray until its end or the budget's.
+void march(Grid g) {
+    // Each of the following has one place in the loop, since kernels with several copies take long to compile: the
+    // ray enters a tetrahedron, takes a sample, searches the structure.
+    uint target = state.cursor == 0u ? state.tet : NONE; // the tetrahedron to enter
+    bool stands = false;
+    bool is_owner = false; // the target is known to own the next sample
+    uint known = state.check >> 30u; // flags of the best candidate
+    state.check &= 0x3fffffffu;
+    for (uint work = 0u; state.next < state.end && (work < BUDGET || is_owner); ++work) {
+        if (target != NONE) {
+            enter(target);
+            target = NONE;
+            stands = true;
+        }
+        // As long as walks succeed, the tree is not searched. Rays wait until all of the subgroup stand in the mesh, and
+        // then walk together; to iso-surfaces, walks are too short for that.
+        bool walks = ISO != 0u || subgroupAll(stands);
+        walk(g, walks, work, stands, is_owner);
+        uint leaf = NONE;
+#ifndef BINARY_TREE
+        if (state.next < state.end && is_to_look()) look(g, stands);
+        if (!stands) pass_empty(g, work, leaf);
+#endif
+        if (stands || state.next >= state.end || is_to_look() || work >= BUDGET) continue;
+        leave();
+        vec3 at = sample_at(view, origin, direction, state.next);
+        vec3 x = normalise(g, at);
+        uint owner = NONE;
+        // Outside of the bounds there is nothing to find.
+        if (all(greaterThanEqual(x, vec3(0.0))) && all(lessThanEqual(x, g.extent.xyz))) {
+            OwnerSearch search = no_search();
+            if (state.cursor != 0u) search = OwnerSearch(state.cursor, best_of(state.tet, known, state.smallest));
+#ifdef BINARY_TREE
+            bool ended = find_owner(search, g, at, x, 0.0, work, BUDGET, owner);
+#else
+            bool ended = find_owner_in(search, g, leaf, at, x, 0.0, work, BUDGET, owner);
+#endif
+            state.cursor = search.cursor;
+            state.tet = search.best.owner;
+            known = best_bits(search.best);
+            state.smallest = search.best.smallest;
+            if (!ended) break;
+        }
+        target = owner;
+        is_owner = owner != NONE;
+        if (!is_owner) pass_by(); // after a gap, the structure is searched first
+    }
+    if (ahead > 1u) state.check = state.next; // `ahead` is not stored: the tree is asked again
+    state.check |= known << 30u;
+    if (state.cursor == 0u) state.tet = stands ? stand.t : NONE;
+}
+
 void main() {
     uint i = item_index();
     uint unfinished = 0u;
@@ -301,100 +341,11 @@ void main() {
     bool met = i < status.at[0].met && states.at[i].next < states.at[i].end;
     if (met && pixel_of(states.at[i].item, uvec2(plan.size[0], plan.size[1]), pixel)) {
         view = frames.at[0].view;
-        Grid g = grid.at[0];
         state = states.at[i];
         uint place = pixel.y * plan.size[0] + pixel.x;
         sum = colors.at[place];
-        uvec2 in_view = uvec2(pixel.x, plan.row + pixel.y);
-        make_ray(view, in_view, origin, direction);
-        halfway = vec3(0.0);
-        if (SHADING != 0u) {
-            precise vec3 h = view.to_light.xyz - direction;
-            float square = max(dot_product(h, h), 1e-12);
-            precise vec3 unit = h * inverse_sqrt(square);
-            halfway = unit;
-        }
-        inverse_direction = inverse_of(direction);
-        if (ISO != 0u || SHADING != 0u) unclipped = kept_stretch(origin, direction, limit_of(in_view, place), cut);
-        // Each of the following has one place in the loop, since kernels with several copies take long to compile: the
-        // ray enters a tetrahedron, takes a sample, searches the structure.
-        uint target = state.cursor == 0u ? state.tet : NONE; // the tetrahedron to enter
-        bool stands = false;
-        bool is_owner = false; // the target is known to own the next sample
-        ahead = 1u;
-        uint known = state.check >> 30u; // flags of the best candidate
-        state.check &= 0x3fffffffu;
-        for (uint work = 0u; state.next < state.end && (work < BUDGET || is_owner); ++work) {
-            if (target != NONE) {
-                enter(target);
-                target = NONE;
-                stands = true;
-            }
-            // As long as the walk succeeds, the tree is not searched. A pass is one sample, after one step if needed.
-            // Rays wait until all of the subgroup stand in the mesh, and then walk together; to iso-surfaces, walks are
-            // too short for that. Walks are not cut short, so that owners do not depend on when a ray has to wait.
-            bool walks = ISO != 0u || subgroupAll(stands);
-            uint misses = 0u; // steps of the walk to the next sample
-            for (uint pass = 0u; (pass < BURST || misses > 0u) && (walks || is_owner) && stands && state.next < state.end && !is_to_look(); ++pass, ++work) {
-                vec3 x = normalise(g, sample_at(view, origin, direction, state.next));
-                Sides sides = sides_of(stand, x);
-                if (!sides.clear && !is_owner) {
-                    stands = ++misses < WALK && go_on(sides);
-                    if (stands) sides = sides_of(stand, x);
-                }
-                if (stands && (sides.clear || is_owner)) {
-                    misses = 0u;
-                    is_owner = false;
-                    take(sides);
-                }
-            }
-#ifndef BINARY_TREE
-            if (state.next < state.end && is_to_look()) {
-                bool hidden;
-                uint behind = stretch_end(g, origin, direction, inverse_direction, state.next, state.end, hidden);
-                if (!hidden) {
-                    state.check = behind;
-                } else if (ISO != 0u) {
-                    // The stretch lies on one side of every surface, so its first and its last sample are enough.
-                    ahead = max(behind - state.next, 2u) - 1u;
-                    state.check = state.next + 1u;
-                } else {
-                    stands = stands && behind - state.next < WALK;
-                    skipped += behind - state.next;
-                    state.next = behind;
-                    state.last = NONE; // as after a transparent sample
-                }
-            }
-            uint leaf = NONE;
-            if (!stands) pass_empty(g, work, leaf);
-#endif
-            if (stands || state.next >= state.end || is_to_look() || work >= BUDGET) continue;
-            leave();
-            vec3 at = sample_at(view, origin, direction, state.next);
-            vec3 x = normalise(g, at);
-            uint owner = NONE;
-            // Outside of the bounds there is nothing to find.
-            if (all(greaterThanEqual(x, vec3(0.0))) && all(lessThanEqual(x, g.extent.xyz))) {
-                OwnerSearch search = no_search();
-                if (state.cursor != 0u) search = OwnerSearch(state.cursor, best_of(state.tet, known, state.smallest));
-#ifdef BINARY_TREE
-                bool ended = find_owner(search, g, at, x, 0.0, work, BUDGET, owner);
-#else
-                bool ended = find_owner_in(search, g, leaf, at, x, 0.0, work, BUDGET, owner);
-#endif
-                state.cursor = search.cursor;
-                state.tet = search.best.owner;
-                known = best_bits(search.best);
-                state.smallest = search.best.smallest;
-                if (!ended) break;
-            }
-            target = owner;
-            is_owner = owner != NONE;
-            if (!is_owner) pass_by(); // after a gap, the structure is searched first
-        }
-        if (ahead > 1u) state.check = state.next; // `ahead` is not stored: the tree is asked again
-        state.check |= known << 30u;
-        if (state.cursor == 0u) state.tet = stands ? stand.t : NONE;
+        begin_ray(uvec2(pixel.x, plan.row + pixel.y), place);
+        march(grid.at[0]);
         unfinished = uint(state.next < state.end);
         states.at[i] = state;
         colors.at[place] = sum;
