@@ -16,7 +16,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("layout", &[]),
     ("grid", &["layout"]),
     ("mesh", &["error", "grid", "layout"]),
-    ("options", &["error", "grid", "named"]),
+    ("options", &["error", "grid", "layout", "named"]),
     ("tree", &["grid", "layout", "options"]),
     ("slicing", &["error", "grid", "layout", "named"]),
     ("render", &["error", "grid", "layout", "mesh"]),
