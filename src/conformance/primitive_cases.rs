@@ -1,10 +1,9 @@
 //! The list of cases for primitives.
 
 use super::data::Keys;
-use super::primitives::{Live, ReduceCase, ScanCase, SortCase, TargetKind};
+use super::primitives::{Live, ScanCase, SortCase, TargetKind};
 use super::{Case, Group, Work};
 use crate::kernels::DeviceClass;
-use crate::primitives::Reduction;
 
 /// Lengths around subgroups, workgroups and tiles of every target, around powers of two, and primes.
 const LENGTHS: [u32; 40] = [
@@ -27,19 +26,6 @@ fn is_few(n: u32) -> bool {
 pub(super) fn add(cases: &mut Vec<Case>) {
     let lengths = || LENGTHS.into_iter().chain([100_000]).chain(LONG);
     let group = |n: u32, quick: bool| if quick && n < 1 << 20 { Group::Quick } else { Group::Full };
-    for operation in [Reduction::Add, Reduction::Min, Reduction::Max] {
-        let keys = if operation == Reduction::Add { Keys::Random } else { Keys::Reversed };
-        for target in TARGETS {
-            for n in lengths() {
-                let quick = target != TargetKind::Narrow && (is_few(n) || operation == Reduction::Add);
-                reduce(cases, group(n, quick), ReduceCase { operation, n, live: Live::Host, keys, target });
-            }
-            for live in COUNTS {
-                reduce(cases, Group::Quick, ReduceCase { operation, n: 10_000, live, keys, target });
-            }
-        }
-        reduce(cases, Group::Large, ReduceCase { operation, n: LARGE, live: Live::Host, keys, target: TargetKind::Device });
-    }
     for target in TARGETS {
         for n in lengths() {
             scan(cases, group(n, true), ScanCase { n, live: Live::Host, in_place: false, target });
@@ -86,16 +72,6 @@ pub(super) fn add(cases: &mut Vec<Case>) {
     }
     sort(cases, Group::Large, SortCase { bits: 21, n: LARGE, live: Live::Host, keys: Keys::Random, target: TargetKind::Device });
     sort(cases, Group::Large, SortCase { bits: 30, n: LARGE, live: Live::All, keys: Keys::Random, target: TargetKind::Device });
-}
-
-fn reduce(cases: &mut Vec<Case>, group: Group, case: ReduceCase) {
-    let operation = match case.operation {
-        Reduction::Add => "add",
-        Reduction::Min => "min",
-        Reduction::Max => "max",
-    };
-    let name = format!("reduce/{operation}/{}/{}{}", case.n, case.live.name(), case.target.suffix());
-    push(cases, name, group, Work::Reduce(case));
 }
 
 fn scan(cases: &mut Vec<Case>, group: Group, case: ScanCase) {

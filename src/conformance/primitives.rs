@@ -1,11 +1,11 @@
-//! Cases that compare reduce, scan and sort with their definitions.
+//! Cases that compare scan and sort with their definitions.
 
 use super::buffers::{FILL, Guarded};
 use super::data::Keys;
 use super::failure::{Verdict, compare};
 use crate::gpu::{Arena, Gpu};
 use crate::kernels::{DeviceClass, ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
-use crate::primitives::{Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs};
+use crate::primitives::{Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
 
 /// The target with which a case runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -101,16 +101,6 @@ impl Live {
     }
 }
 
-/// A reduction.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ReduceCase {
-    pub operation: Reduction,
-    pub n: u32,
-    pub live: Live,
-    pub keys: Keys,
-    pub target: TargetKind,
-}
-
 /// An exclusive scan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScanCase {
@@ -129,25 +119,6 @@ pub(crate) struct SortCase {
     pub live: Live,
     pub keys: Keys,
     pub target: TargetKind,
-}
-
-pub(crate) fn reduce(gpu: &Gpu, case: ReduceCase) -> Verdict {
-    let data = case.keys.make(case.n, 32);
-    let (count, _word, items) = case.live.count(gpu, case.n)?;
-    let values = Guarded::new(gpu, "olbvh.conformance.values", &data, 0)?;
-    let result = Guarded::new(gpu, "olbvh.conformance.result", &[], 1)?;
-    let scratch = Guarded::scratch(gpu, "olbvh.conformance.scratch", REDUCE_SCRATCH)?;
-    gpu.submit("olbvh.conformance.reduce", |r| cmd_reduce(r, case.operation, values.all(), result.all(), count, scratch.all()))?;
-    let live = data[..items].iter().copied();
-    let expected = match case.operation {
-        Reduction::Add => live.fold(0, u32::wrapping_add),
-        Reduction::Min => live.fold(u32::MAX, u32::min),
-        Reduction::Max => live.fold(0, u32::max),
-    };
-    let stage = "primitives.reduce";
-    scratch.check_guard(gpu, stage)?;
-    compare(stage, "values", &data, &values.read(gpu, stage)?)?;
-    compare(stage, "result", &[expected], &result.read(gpu, stage)?)
 }
 
 pub(crate) fn scan(gpu: &Gpu, case: ScanCase) -> Verdict {
