@@ -183,7 +183,7 @@ fn buffers_submissions_and_stages_are_named() {
                 wrong.push(format!("{}: stage `{name}`", file.display()));
             }
         }
-        for name in literals(text, "gpu.submit(") {
+        for name in literals(text, "gpu.submit(").into_iter().chain(literals(text, "until_done(")) {
             n += 1;
             if !name.starts_with("olbvh.") {
                 wrong.push(format!("{}: submission `{name}`", file.display()));
