@@ -165,7 +165,7 @@ pub(crate) fn nearest_in(tree: &Tree, points: &[[f32; 3]], within: f32, cells: O
             report(all.owners.len() as u64 + u64::from(count - unfinished.min(count)), points.len() as u64)?;
             Ok((unfinished == 0).then_some(()))
         })?;
-        let states: Vec<NearState> = gpu.download(&buffer, memory.states.part(0, 16 * u64::from(count)))?;
+        let states: Vec<NearState> = gpu.download(&buffer, memory.states.part(0, size_of::<NearState>() as u64 * u64::from(count)))?;
         all.owners.extend(states.iter().map(|state| state.owner));
         all.squares.extend(states.iter().map(|state| state.square));
         all.barycentrics.extend(gpu.download::<[f32; 4]>(&buffer, memory.barycentrics.part(0, 16 * u64::from(count)))?);
@@ -214,7 +214,7 @@ mod tests {
                     rounds = Rounds::resume(1);
                     count += 1;
                 }
-                let states: Vec<NearState> = gpu.download(&buffer, memory.states.part(0, 16 * points.len() as u64)).unwrap();
+                let states: Vec<NearState> = gpu.download(&buffer, memory.states).unwrap();
                 let wrong = (0..points.len()).filter(|&i| (states[i].owner, states[i].square) != expected[i]).count();
                 assert!(wrong == 0 && count > 3, "level {level}, budget {budget}: {wrong} wrong after {count} rounds");
             }
