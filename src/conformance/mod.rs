@@ -57,6 +57,7 @@ use ranges::RangesCase;
 use slice::SliceCase;
 
 use crate::mesh::Mesh;
+use crate::named::named;
 
 /// Group of cases by the time that they take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -69,16 +70,7 @@ pub enum Group {
     Large,
 }
 
-impl Group {
-    /// Name for filters and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Quick => "quick",
-            Self::Full => "full",
-            Self::Large => "large",
-        }
-    }
-}
+named!(Group, "group of cases", [Quick = "quick", Full = "full", Large = "large"]);
 
 /// One comparison.
 #[derive(Clone, Debug)]

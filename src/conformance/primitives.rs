@@ -5,6 +5,7 @@ use super::data::Keys;
 use super::failure::{Verdict, compare};
 use crate::gpu::{Arena, Gpu};
 use crate::kernels::{DeviceClass, ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
+use crate::named::named;
 use crate::primitives::{Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
 
 /// The target with which a case runs.
@@ -71,17 +72,13 @@ pub(crate) enum Live {
     Above,
 }
 
-impl Live {
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Host => "host",
-            Self::All => "indirect",
-            Self::Below => "indirect-below",
-            Self::Zero => "indirect-zero",
-            Self::Above => "indirect-above",
-        }
-    }
+named!(
+    Live,
+    "kind of count",
+    [Host = "host", All = "indirect", Below = "indirect-below", Zero = "indirect-zero", Above = "indirect-above"]
+);
 
+impl Live {
     /// The number stored on the device, and the number of items that it means.
     fn numbers(self, n: u32) -> (u32, u32) {
         match self {
