@@ -217,7 +217,8 @@ fn kernels_source(interfaces: &[Interface]) -> String {
             };
             let _ = writeln!(s, "            BufferInfo {{ name: \"{}\", access: Access::{access}, alignment: {} }},", b.name, b.alignment);
         }
-        let _ = writeln!(s, "        ],\n        scalar_bytes: {},\n    }};\n}}", k.scalar_bytes);
+        let for_queries = k.stem.starts_with("query.") || k.stem.starts_with("baseline.");
+        let _ = writeln!(s, "        ],\n        scalar_bytes: {},\n        for_queries: {for_queries},\n    }};\n}}", k.scalar_bytes);
         let _ = writeln!(s, "impl Arguments for {name} {{\n    fn info(&self) -> &'static KernelInfo {{\n        Self::INFO\n    }}");
         let _ = writeln!(
             s,

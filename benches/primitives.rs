@@ -1,4 +1,4 @@
-//! Reduce, scan and sort, in elements per second of device time, verified before they are timed.
+//! Scan and sort, in elements per second of device time, verified before they are timed.
 //! Run with `cargo bench --bench primitives`.
 
 #[path = "../tests/submit/mod.rs"]
@@ -6,7 +6,7 @@ mod submit;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use olbvh::gpu::{Arena, Buffer, DeviceKind, Gpu, GpuOptions, Recorder};
-use olbvh::primitives::{Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs};
+use olbvh::primitives::{Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
 use std::time::Duration;
 use submit::submit;
 
@@ -33,22 +33,6 @@ fn timed(gpu: &Gpu, iterations: u64, mut record: impl FnMut(&mut Recorder<'_>) -
 
 fn upload(gpu: &Gpu, data: &[u32]) -> Buffer {
     gpu.upload("olbvh.bench.input", data).expect("memory for the input")
-}
-
-fn reduce(c: &mut Criterion) {
-    let gpu = Gpu::new(&GpuOptions::default()).expect("a device");
-    let mut group = c.benchmark_group("reduce");
-    for &n in sizes(&gpu) {
-        let data = keys(n);
-        let (input, result) = (upload(&gpu, &data), upload(&gpu, &[0]));
-        let scratch = gpu.buffer("olbvh.bench.scratch", REDUCE_SCRATCH).expect("scratch");
-        let mut record = |r: &mut Recorder<'_>| cmd_reduce(r, Reduction::Add, input.all(), result.all(), Count::host(n), scratch.all());
-        timed(&gpu, 1, &mut record);
-        let expected = data.iter().fold(0u32, |sum, v| sum.wrapping_add(*v));
-        assert_eq!(gpu.download::<u32>(&result, result.all()).expect("a result")[0], expected);
-        group.throughput(Throughput::Elements(u64::from(n)));
-        group.bench_function(BenchmarkId::new("add", n), |b| b.iter_custom(|i| timed(&gpu, i, &mut record)));
-    }
 }
 
 fn scan(c: &mut Criterion) {
@@ -104,5 +88,5 @@ fn sort(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, reduce, scan, sort);
+criterion_group!(benches, scan, sort);
 criterion_main!(benches);

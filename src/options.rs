@@ -4,10 +4,7 @@ use crate::error::{Error, Result};
 use crate::grid::MAX_LEVEL;
 use crate::named::named;
 
-/// Default tolerance: how far below 0 the smallest barycentric coordinate of a point's owner may be in a boundary leaf
-/// (SPEC 3.1). Whatever the tolerance, it may also be as far as rounding can put a point that the owner contains, which is
-/// farther in thin tetrahedra.
-pub const TOLERANCE: f32 = 1e-5;
+pub use crate::layout::constants::slice_locate::TOLERANCE;
 
 /// Number of entries of a list that one dispatch searches.
 pub const LIST_PART: u32 = 16_384;

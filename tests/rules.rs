@@ -16,7 +16,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("layout", &[]),
     ("grid", &["layout"]),
     ("mesh", &["error", "grid", "layout"]),
-    ("options", &["error", "grid", "named"]),
+    ("options", &["error", "grid", "layout", "named"]),
     ("tree", &["grid", "layout", "options"]),
     ("slicing", &["error", "grid", "layout", "named"]),
     ("render", &["error", "grid", "layout", "mesh"]),
@@ -29,8 +29,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("glsl", &["build", "error", "gpu", "layout", "options"]),
     ("query", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing", "times"]),
     ("blocks", &["build", "error", "gpu", "grid", "layout", "mesh", "options", "query", "reference", "render", "slicing", "times"]),
-    ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "primitives", "query", "reference", "render", "slicing", "times"]),
-    ("conformance", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "slicing", "tree"]),
+    ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "named", "primitives", "query", "reference", "render", "slicing", "times"]),
+    ("conformance", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing", "tree"]),
     ("capi", &["build", "error", "glsl", "gpu", "grid", "layout", "mesh", "options", "query", "reference", "render", "slicing"]),
     ("bench", &["baseline", "build", "error", "gpu", "grid", "kernels", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing", "times", "tree"]),
     ("tune", &["bench", "build", "error", "formats", "gpu", "kernels", "mesh", "options", "query", "reference", "render", "slicing", "times", "tree"]),
@@ -183,7 +183,7 @@ fn buffers_submissions_and_stages_are_named() {
                 wrong.push(format!("{}: stage `{name}`", file.display()));
             }
         }
-        for name in literals(text, "gpu.submit(") {
+        for name in literals(text, "gpu.submit(").into_iter().chain(literals(text, "until_done(")) {
             n += 1;
             if !name.starts_with("olbvh.") {
                 wrong.push(format!("{}: submission `{name}`", file.display()));

@@ -7,9 +7,6 @@
 #include "shared/tet.glsl"
 #include "shared/separate.glsl"
 #include "shared/overlap.glsl"
-layout(constant_id = 2) const uint OWN_STRIDE = 3;
-layout(constant_id = 3) const uint STRIDE = 3;
-layout(constant_id = 4) const uint EACH_ONCE = 0; // for overlap_tets.glsl
 ARGUMENTS(14)
     uint tets;
     uint budget; // nodes and tests per tetrahedron and dispatch

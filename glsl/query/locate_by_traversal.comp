@@ -9,7 +9,8 @@
 #include "shared/node.glsl"
 layout(constant_id = 2) const uint STACK = 8;
 layout(constant_id = 3) const uint LISTS = 0;
-layout(constant_id = 4) const uint MOST = 1; // entries of a list that are searched
+// Most entries of a list for `LocateMethod::Traversal`: so many that no loop gets too long for a driver.
+const uint MOST_TRAVERSED = 32000u;
 ARGUMENTS(12)
     uint count;
     uint stride;
@@ -54,7 +55,7 @@ void main() {
         vec3 x = normalise(g, at);
         uvec2 range = entry_range(leaf_found);
         Best best = walked(g, leaf_found, range, at, x);
-        uint end = walks_in(leaf_found, range) ? range.x : min(range.y, range.x + MOST);
+        uint end = walks_in(leaf_found, range) ? range.x : min(range.y, range.x + MOST_TRAVERSED);
         for (uint i = range.x; i < end && !best.inside; ++i) {
             uint t = listed_tet(i);
             Tet tet = load_tet(words(cells.at[t]));

@@ -9,11 +9,7 @@
 #include "shared/cell_range.glsl"
 #include "shared/separate.glsl"
 #include "shared/overlap.glsl"
-layout(constant_id = 2) const uint EACH_ONCE = 1;
-layout(constant_id = 3) const uint BUDGET = 256;
-layout(constant_id = 4) const uint OWN_STRIDE = 3;
-layout(constant_id = 5) const uint STRIDE = 3;
-layout(constant_id = 6) const uint FILL = 0;
+layout(constant_id = 5) const uint FILL = 0;
 ARGUMENTS(15)
     uint tets;
     uint capacity; // pairs that `found` holds
@@ -36,6 +32,7 @@ BUFFER(14, READ_WRITE, OverlapStatus, status)
 #include "shared/bad.glsl"
 #include "shared/tree.glsl"
 #include "shared/overlap_tets.glsl"
+#include "shared/overlap_leaf.glsl"
 
 bool walk_ended = false;
 uvec3 lo, hi;

@@ -10,10 +10,6 @@
 #include "shared/cell_range.glsl"
 #include "shared/separate.glsl"
 #include "shared/overlap.glsl"
-layout(constant_id = 2) const uint EACH_ONCE = 1;
-layout(constant_id = 3) const uint BUDGET = 256;
-layout(constant_id = 4) const uint OWN_STRIDE = 3;
-layout(constant_id = 5) const uint STRIDE = 3;
 ARGUMENTS(15)
     uint most; // length of `waiting`
 END_ARGUMENTS
@@ -30,6 +26,7 @@ BUFFER(14, READ_WRITE, OverlapStatus, status)
 #include "shared/tree.glsl"
 #include "shared/boundary_node.glsl"
 #include "shared/overlap_tets.glsl"
+#include "shared/overlap_leaf.glsl"
 
 bool walk_ended = false;
 Grid g;

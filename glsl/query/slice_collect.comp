@@ -6,7 +6,6 @@
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/voxels.glsl"
-layout(constant_id = 2) const uint RUN = 64;
 ARGUMENTS(5)
     uint width; // of the rows
     uint height; // of the layers
@@ -20,7 +19,7 @@ BUFFER(4, writeonly, TouchState, states)
 
 void main() {
     uint i = item_index(), count = 0u, inside = 0u, wait = 0u;
-    uvec2 lines = rows_of_run(RUN, rows, height, i / width);
+    uvec2 lines = rows_of_run(rows, height, i / width);
     // A run is listed only once all centres have been located.
     if (lines.y > 0u && status.at[0].locating == 0u) {
         count = lines.y;
@@ -38,7 +37,7 @@ void main() {
     if (wait > 0u) runs.at[i].waiting = 0u;
     uint line = lines.x * width + i % width;
     // Row by row, since neighbours in a row are near the same tetrahedra.
-    for (uint k = 0u; k < RUN; ++k) {
+    for (uint k = 0u; k < VOXEL_RUN; ++k) {
         uint voxel = line + k * width;
         bool waits = wait > 0u && k < count && answers.at[voxel] == SLICE_PENDING;
         uvec4 waiting = subgroupBallot(waits);

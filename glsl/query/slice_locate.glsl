@@ -8,14 +8,18 @@
 #include "shared/tet.glsl"
 #include "shared/structure.glsl"
 #include "shared/voxels.glsl"
-layout(constant_id = 2) const uint RUN = 64;
-layout(constant_id = 3) const uint WALK = 6;
+layout(constant_id = 2) const uint PART = 0; // not 0: centres outside of the plan's cells belong to another block
+layout(constant_id = 3) const uint FIELD = 0; // not 0: there is a field
+layout(constant_id = 5) const uint ON_CELLS = 0;
+const uint WALK = 6u; // Most steps of a walk across faces before the structure is searched.
 const uint LEAP = 8u; // voxels of a run that one test can find to be empty
-layout(constant_id = 5) const uint PART = 0; // not 0: centres outside of the plan's cells belong to another block
-layout(constant_id = 6) const uint BUDGET = 8192; // tetrahedra tested per run and dispatch, roughly
-layout(constant_id = 7) const uint TOLERANCE = 0; // the bits of a float
-layout(constant_id = 8) const uint FIELD = 0; // not 0: there is a field
-layout(constant_id = 9) const uint ON_CELLS = 0;
+// Entries, nodes and tetrahedra of walks that one run may test in one dispatch, roughly. A test takes up to five passes
+// of loops, and some drivers end the loops of an invocation after 65,535 passes in all.
+const uint BUDGET = 8192u;
+// Default tolerance: how far below 0 the smallest barycentric coordinate of a point's owner may be in a boundary leaf
+// (SPEC 3.1). Whatever the tolerance, it may also be as far as rounding can put a point that the owner contains, which is
+// farther in thin tetrahedra.
+const float TOLERANCE = 1e-5;
 ARGUMENTS(10 + STRUCTURE_BUFFERS)
     uint fresh; // not 0: nothing has been done yet
 END_ARGUMENTS
@@ -141,7 +145,7 @@ void main() {
     uint unfinished = 0u;
     plan = plans.at[0];
     if (i == 0u) status.at[0].refused = plan.refused;
-    uvec2 lines = rows_of_run(RUN, plan.rows, plan.height, i / plan.width);
+    uvec2 lines = rows_of_run(plan.rows, plan.height, i / plan.width);
     if (lines.y > 0u) {
         Grid g = grid.at[0];
         state = RunState(0u, NONE, 0u, NONE, 0u, SMALLEST_FLOAT, 0u, 0u);
@@ -197,7 +201,7 @@ void main() {
             vec3 x = normalise(g, at);
             OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
             uint owner;
-            bool ended = find_owner(search, g, at, x, uintBitsToFloat(TOLERANCE), work, BUDGET, owner);
+            bool ended = find_owner(search, g, at, x, TOLERANCE, work, BUDGET, owner);
             state.cursor = search.cursor;
             state.best = search.best.owner;
             state.in_box = best_bits(search.best);

@@ -11,10 +11,10 @@
 #include "shared/boxes.glsl"
 #include "shared/frame.glsl"
 #include "shared/rays.glsl"
-layout(constant_id = 2) const uint STACK = 8;
-layout(constant_id = 3) const uint PART = 0;
-layout(constant_id = 4) const uint ISO = 0;
-layout(constant_id = 5) const uint DEPTH = 0;
+layout(constant_id = 2) const uint PART = 0;
+layout(constant_id = 3) const uint ISO = 0;
+layout(constant_id = 4) const uint DEPTH = 0;
+const uint STACK = 8u; // nodes on the short stack of the traversal
 ARGUMENTS(8 + STRUCTURE_BUFFERS)
     uint items; // pixels in whole blocks
 END_ARGUMENTS

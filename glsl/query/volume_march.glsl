@@ -14,7 +14,6 @@ layout(constant_id = 2) const uint SHADING = 0;
 layout(constant_id = 3) const uint ON_CELLS = 0;
 layout(constant_id = 6) const uint ISO = 0;
 layout(constant_id = 7) const uint DEPTH = 0;
-layout(constant_id = 8) const uint BUDGET = 1024; // tetrahedra tested per ray and dispatch, roughly
 NO_SCALARS(11 + STRUCTURE_BUFFERS) // the most that there is room for
 GRID(0, readonly)
 RECORDS(1, uvec4, cells)
@@ -38,6 +37,8 @@ DrawUniforms plan;
 
 const uint WALK = 6u;   // Most steps of a walk across faces before the structure is searched.
 const uint BURST = 32u; // Passes along walks before rays that wait for the structure are served.
+// Entries, nodes, and tetrahedra on and around walks that one ray may test in one dispatch, roughly.
+const uint BUDGET = 1024u;
 
 // The ray, and its state.
 vec3 origin, direction, inverse_direction, halfway;

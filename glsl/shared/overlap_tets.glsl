@@ -1,5 +1,7 @@
-// Loads tetrahedra of both meshes, and decides in which leaf two of them are compared. Needs overlap.glsl and
-// own_cells, own_positions, cells, positions, frame.
+// Loads tetrahedra of both meshes. Needs overlap.glsl and own_cells, own_positions, cells, positions, frame.
+layout(constant_id = 2) const uint OWN_STRIDE = 3; // words from one point to the next
+layout(constant_id = 3) const uint STRIDE = 3;
+
 Grid joint; // of the joint grid, only lo and scale are set
 
 RawTet own_tet(uint t) {
@@ -24,12 +26,4 @@ RawTet other_tet(uint t) {
 
 void to_joint(RawTet t, out vec3 v[4]) {
     for (uint k = 0u; k < 4u; ++k) v[k] = normalise(joint, t.v[k]);
-}
-
-// Whether two tetrahedra are compared in the leaf with this code. With the assignment `Aabb` (EACH_ONCE), a pair is
-// compared once: in the cell of the lower corner of the intersection of their boxes.
-bool compared_in(Grid g, uint code, RawTet own, RawTet other) {
-    if (!boxes_meet(own.lo, own.hi, other.lo, other.hi)) return false;
-    if (EACH_ONCE == 0u) return true;
-    return morton(quantize(g, max(own.lo, other.lo))) >> (3u * (MAX_LEVEL - g.level)) == code;
 }

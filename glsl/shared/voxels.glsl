@@ -2,6 +2,9 @@
 const uint SLICE_PENDING = 0xfffffffeu; // the centre lies in no tetrahedron, and the box has not been tested yet
 const uint NAN = 0x7fc00000u; // value of an empty voxel
 const uint SLICE_TOUCHED = 0x80000000u; // Added to the owner of a voxel that is only touched.
+// Most voxels of a run: voxels of a column of a layer whose centres are located one after the other, each from the
+// owner of the one before.
+const uint VOXEL_RUN = 64u;
 
 // Row number i of the band: its number within its layer, and the layer.
 uvec2 voxel_row(SliceUniforms plan, uint i) {
@@ -10,9 +13,9 @@ uvec2 voxel_row(SliceUniforms plan, uint i) {
 }
 
 // The rows of run number i of a band of `rows` rows: the first of them, and their number. Twin of `Rows::run`.
-uvec2 rows_of_run(uint run, uint rows, uint height, uint i) {
-    uint most = min(rows, height), runs = (most + run - 1u) / run, layer = i / runs * most, begin = (i % runs) * run;
-    uint end = min(rows, layer + min(most, begin + run));
+uvec2 rows_of_run(uint rows, uint height, uint i) {
+    uint most = min(rows, height), runs = (most + VOXEL_RUN - 1u) / VOXEL_RUN, layer = i / runs * most, begin = (i % runs) * VOXEL_RUN;
+    uint end = min(rows, layer + min(most, begin + VOXEL_RUN));
     return uvec2(layer + begin, end - min(end, layer + begin));
 }
 

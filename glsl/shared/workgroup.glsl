@@ -1,4 +1,4 @@
-// Scans and reductions over a workgroup, by subgroups of any size.
+// Scans and sums over a workgroup, by subgroups of any size.
 shared uint subgroup_totals[128];
 
 // The sum of `v` over the subgroups before this one; `total` receives that over all. Called by the whole workgroup.
@@ -29,16 +29,4 @@ uint workgroup_add(uint v) {
     uint total;
     subgroups_exclusive_add(v, total);
     return total;
-}
-
-// The largest `v` of the workgroup.
-uint workgroup_max(uint v) {
-    v = subgroupMax(v);
-    if (gl_NumSubgroups > 1u) {
-        barrier();
-        if (subgroupElect()) subgroup_totals[gl_SubgroupID] = v;
-        barrier();
-        for (uint s = 0u; s < gl_NumSubgroups; ++s) v = max(v, subgroup_totals[s]);
-    }
-    return v;
 }

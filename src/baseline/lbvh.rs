@@ -8,7 +8,7 @@ use crate::layout::{Grid, LbvhNode};
 use crate::mesh::On;
 use crate::primitives::{Count, SortScratch, cmd_fill, cmd_sort_pairs};
 use crate::query::searched::{BinaryTree, Searched, Structure};
-use crate::query::{LocateOutput, Located, PointInput, Progress, Rendered, Rounds, Sliced, numbered, render_in, slice_in};
+use crate::query::{LocateOutput, Located, PointInput, Progress, Rendered, Rounds, Sliced, numbered, render_in, slice_in, until_done};
 use crate::render::PicturePlan;
 use crate::slicing::{Band, Extrapolate, VoxelGrid};
 use crate::times::StageTimes;
@@ -213,15 +213,11 @@ impl Lbvh {
         let (memory, (owners, barycentrics, unfinished)) = Arena::reserve(gpu, "olbvh.lbvh.located", carve)?;
         let view = self.mesh.view;
         let (asked, output) = ((uploaded.all(), count), LocateOutput { owners, barycentrics });
-        let (mut located, mut rounds) = (Located::default(), Rounds::begin(1));
-        loop {
-            let record = |r: &mut Recorder<'_>| cmd_locate_lbvh(r, (&view, &self.tree), asked, &output, unfinished, tolerance, rounds);
-            located.times.add(gpu.submit("olbvh.lbvh.locate", record)?.1);
-            rounds = Rounds::resume(1);
-            if gpu.download::<u32>(&memory, unfinished.part(0, 4))?.first() == Some(&0) {
-                break;
-            }
-        }
+        let mut located = Located::default();
+        let record = |r: &mut Recorder<'_>, rounds| cmd_locate_lbvh(r, (&view, &self.tree), asked, &output, unfinished, tolerance, rounds);
+        until_done(gpu, "olbvh.lbvh.locate", 1, &mut located.times, record, || {
+            Ok((gpu.download_one::<u32>(&memory, unfinished)? == 0).then_some(()))
+        })?;
         located.owners = gpu.download(&memory, owners.part(0, 4 * n))?;
         located.barycentrics = gpu.download(&memory, barycentrics.part(0, 16 * n))?;
         Ok(located)

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Arena, Buffer, BufferRef, Groups, Recorder};
 use crate::kernels::{LbvhOverlap, LbvhOverlapSpec};
 use crate::layout::{NodeFrame, OverlapStatus, set_bits, wide};
-use crate::query::{Overlapped, Progress};
+use crate::query::{Overlapped, Progress, Rounds, until_done};
 use crate::reference::overlap::{joint_grid, node_frame};
 use std::mem::offset_of;
 
@@ -83,31 +83,26 @@ impl Lbvh {
         };
         let directions = [direction([self, other], forth)?, direction([other, self], back)?];
         let all = [self, other].map(|lbvh| u64::from(lbvh.mesh.view.input.tets)).iter().sum::<u64>();
-        let statuses = loop {
-            let ((), time) = gpu.submit("olbvh.lbvh.overlap", |r| {
-                for direction in &directions {
-                    if done.times.submissions == 0 {
-                        for part in [direction.places, direction.hits, direction.status] {
-                            r.fill(part, 0);
-                        }
-                    } else {
-                        r.fill(direction.status.part(offset_of!(OverlapStatus, unfinished) as u64, 4), 0);
-                    }
+        let record = |r: &mut Recorder<'_>, rounds: Rounds| {
+            for direction in &directions {
+                if rounds.resume {
+                    r.fill(direction.status.part(offset_of!(OverlapStatus, unfinished) as u64, 4), 0);
+                } else {
+                    [direction.places, direction.hits, direction.status].into_iter().for_each(|part| r.fill(part, 0));
                 }
-                r.barrier("lbvh.clear → lbvh.overlap");
-                r.stage("lbvh.overlap", |r| directions.iter().try_for_each(|w| w.cmd_search(r)))
-            })?;
-            done.times.add(time);
+            }
+            r.barrier("lbvh.clear → lbvh.overlap");
+            r.stage("lbvh.overlap", |r| directions.iter().try_for_each(|w| w.cmd_search(r)))
+        };
+        let statuses = until_done(gpu, "olbvh.lbvh.overlap", 1, &mut done.times, record, || {
             let mut statuses = [OverlapStatus::default(); 2];
             for (status, direction) in statuses.iter_mut().zip(&directions) {
                 *status = gpu.download_one(&memory, direction.status)?;
             }
             let unfinished = statuses.iter().map(|s| u64::from(s.unfinished)).sum::<u64>();
             report(all.saturating_sub(unfinished), all)?;
-            if unfinished == 0 {
-                break statuses;
-            }
-        };
+            Ok((unfinished == 0).then_some(statuses))
+        })?;
         let hits = |direction: &Direction<'_>| Ok::<_, Error>(set_bits(gpu.download(&memory, direction.hits)?));
         (done.overlap.a, done.overlap.b) = (hits(&directions[0])?, hits(&directions[1])?);
         for (effort, status) in done.overlap.effort.iter_mut().zip(statuses) {

@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::gpu::{AccelerationStructure, Arena, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, Triangles};
 use crate::kernels::{FaceHit, FaceMissed, ListFaces, ListFacesSpec, LocateByPipeline, LocateByQuery, LocateByQuerySpec};
 use crate::layout::constants::locate_by_ray::SCALE;
+use crate::named::named;
 use crate::primitives::{Count, ScanScratch, cmd_exclusive_scan};
 use crate::query::{LocateOutput, Located, PointInput, numbered};
 use crate::times::StageTimes;
@@ -24,10 +25,9 @@ pub enum RayMethod {
     Pipeline,
 }
 
-impl RayMethod {
-    /// Both methods.
-    pub const ALL: [Self; 2] = [Self::Query, Self::Pipeline];
+named!(RayMethod, "way to trace rays", [Query = "ray query", Pipeline = "ray pipeline"]);
 
+impl RayMethod {
     /// Whether the device supports the method.
     pub fn of(self, gpu: &Gpu) -> bool {
         let ways = gpu.report().requirements.ray_tracing;

@@ -5,6 +5,7 @@ use super::measure::Spread;
 use super::stored::{StoredCopy, StoredFigure, StoredMesh, StoredStructure, leaves, read};
 use super::table::{Table, mebibytes, number, text_of};
 use crate::error::Result;
+use crate::named::named;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -27,6 +28,8 @@ pub enum Verdict {
     Unknown,
 }
 
+named!(Verdict, "verdict", [Faster = "FASTER", Slower = "SLOWER", WithinSpread = "within spread", Unknown = "too few repetitions"]);
+
 impl Verdict {
     fn of([a, b]: [Spread; 2], repetitions: u32) -> Self {
         match () {
@@ -34,16 +37,6 @@ impl Verdict {
             () if b.max < a.min => Self::Faster,
             () if b.min > a.max => Self::Slower,
             () => Self::WithinSpread,
-        }
-    }
-
-    /// The verdict as tables show it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Faster => "FASTER",
-            Self::Slower => "SLOWER",
-            Self::WithinSpread => "within spread",
-            Self::Unknown => "too few repetitions",
         }
     }
 }
@@ -197,7 +190,7 @@ impl Comparison {
             let of: Vec<&Compared> = self.compared.iter().filter(|c| c.measurement == *name).collect();
             let mean = (of.iter().map(|c| c.ratio.ln()).sum::<f64>() / of.len() as f64).exp();
             let count = |v: Verdict| of.iter().filter(|c| c.verdict == v).count().to_string();
-            let counts = [Verdict::Faster, Verdict::Slower, Verdict::WithinSpread, Verdict::Unknown].map(count);
+            let counts = Verdict::EVERY.map(count);
             [vec![(*name).to_owned(), of.len().to_string(), number(mean)], counts.to_vec()].concat()
         };
         Table { title: "Summary: time of B by time of A".into(), header: text_of(&header), rows: names.iter().map(row).collect() }

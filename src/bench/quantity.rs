@@ -1,5 +1,6 @@
 //! The quantities that are measured.
 
+use crate::named::named;
 use serde::Serialize;
 
 /// A quantity that is measured.
@@ -28,21 +29,25 @@ pub enum Quantity {
     TraverseCoherent,
 }
 
-impl Quantity {
-    /// All quantities, in the paper's order.
-    pub const ALL: [Self; 10] = [
-        Self::Build,
-        Self::Intervals,
-        Self::March,
-        Self::LocateSamples,
-        Self::Slice,
-        Self::Overlap,
-        Self::LocateRandom,
-        Self::LocateCoherent,
-        Self::TraverseRandom,
-        Self::TraverseCoherent,
-    ];
+// In the paper's order; files have these names, too.
+named!(
+    Quantity,
+    "quantity",
+    [
+        Build = "fig06_construction",
+        Intervals = "table3_ray_intervals",
+        March = "fig07_samples",
+        LocateSamples = "fig07_samples_located",
+        Slice = "fig08_slicing",
+        Overlap = "fig10_overlap",
+        LocateRandom = "location_random",
+        LocateCoherent = "location_coherent",
+        TraverseRandom = "location_random_traversal",
+        TraverseCoherent = "location_coherent_traversal",
+    ]
+);
 
+impl Quantity {
     /// The quantity for the same points, located by the paper's traversal; `None` if there is none.
     pub(super) fn traversed(self) -> Option<Self> {
         match self {
@@ -65,22 +70,6 @@ impl Quantity {
             Self::LocateSamples => "Samples inside the mesh, each located by itself (Fig. 7)",
             Self::TraverseRandom => "Point location by the paper's traversal, random points",
             Self::TraverseCoherent => "Point location by the paper's traversal, points along a Z curve",
-        }
-    }
-
-    /// Name of a file, without extension.
-    pub fn stem(self) -> &'static str {
-        match self {
-            Self::Build => "fig06_construction",
-            Self::Intervals => "table3_ray_intervals",
-            Self::March => "fig07_samples",
-            Self::Slice => "fig08_slicing",
-            Self::Overlap => "fig10_overlap",
-            Self::LocateRandom => "location_random",
-            Self::LocateCoherent => "location_coherent",
-            Self::LocateSamples => "fig07_samples_located",
-            Self::TraverseRandom => "location_random_traversal",
-            Self::TraverseCoherent => "location_coherent_traversal",
         }
     }
 

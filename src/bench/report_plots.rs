@@ -12,11 +12,11 @@ use std::fmt::Write as _;
 pub fn plots(report: &Report) -> Vec<(String, String)> {
     let figure = |q: Quantity| {
         let unit = if q.is_rate() { "million per second, more is better" } else { "milliseconds, less is better" };
-        (q.stem(), format!("{}: {unit}", q.title()), chart(report, &move |s| s.figure(q).map(Figure::shown)))
+        (q.name(), format!("{}: {unit}", q.title()), chart(report, &move |s| s.figure(q).map(Figure::shown)))
     };
     let memory = |s: &StructureReport| Some(s.memory.total as f64 / f64::from(1 << 20));
     let memory = ("table2_memory", "Memory (Table 2): MiB, less is better".to_owned(), chart(report, &memory));
-    let all = Quantity::ALL.into_iter().map(figure).chain([memory]);
+    let all = Quantity::EVERY.into_iter().map(figure).chain([memory]);
     let bars = all.filter_map(|(stem, title, chart)| Some((format!("{stem}.svg"), frame(report, &title, &chart?))));
     bars.chain(scaling_plots::plots(report)).collect()
 }

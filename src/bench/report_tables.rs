@@ -83,7 +83,7 @@ fn main_tables(report: &Report) -> Vec<Table> {
     tables.extend(scaling(report));
     tables.extend(figures(report, Quantity::Build));
     tables.extend(total.into_iter().chain(paper));
-    tables.extend(Quantity::ALL[1..].iter().filter_map(|&q| figures(report, q)));
+    tables.extend(Quantity::EVERY[1..].iter().filter_map(|&q| figures(report, q)));
     tables.extend(lost);
     tables.extend(report.meshes.iter().filter_map(|m| stages(m, "", is_main)));
     tables
@@ -143,7 +143,7 @@ fn detail_tables(report: &Report) -> Vec<Table> {
             let figure = move |f: &Figure| {
                 let t = &f.timing;
                 let device = t.device_ms.map_or(text_of(&["–"; 3]), |d| [d.min, d.median, d.max].map(number).to_vec());
-                [vec![name.clone(), f.quantity.stem().into(), t.repetitions.to_string()], device, vec![number(t.wall_ms.median)]].concat()
+                [vec![name.clone(), f.quantity.name().into(), t.repetitions.to_string()], device, vec![number(t.wall_ms.median)]].concat()
             };
             s.figures.iter().map(figure).collect::<Vec<_>>()
         };

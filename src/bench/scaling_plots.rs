@@ -56,7 +56,7 @@ pub(super) fn plots(report: &Report) -> Vec<(String, String)> {
             }
         }
         let title = format!("Scaling, {}: {} over tetrahedra, less is better", quantity.title(), unit(quantity));
-        Some((format!("scaling_{}.svg", quantity.stem()), frame(report, &title, &svg)))
+        Some((format!("scaling_{}.svg", quantity.name()), frame(report, &title, &svg)))
     };
     QUANTITIES.into_iter().filter_map(plot).collect()
 }

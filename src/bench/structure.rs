@@ -35,7 +35,7 @@ impl Kind {
         let [aabb, planes, exact] = Assign::EVERY.map(|assign| (assign, Lists::All));
         let choices = [aabb, planes, exact, (Assign::default(), Lists::Boundary)];
         let octrees = (0..3).flat_map(|alpha| choices.map(|(assign, lists)| Self::Octree { alpha, assign, lists }));
-        octrees.chain([Self::Fine, Self::Lbvh]).chain(RayMethod::ALL.map(Self::Rays)).collect()
+        octrees.chain([Self::Fine, Self::Lbvh]).chain(RayMethod::EVERY.map(Self::Rays)).collect()
     }
 
     /// How tetrahedra are assigned to the leaves of an octree, and which leaves list all of theirs.
@@ -60,8 +60,7 @@ impl std::fmt::Display for Kind {
             Self::Octree { alpha, lists, .. } => write!(f, "OLBVH α={alpha} lists {lists}"),
             Self::Fine => f.write_str("OLBVH fine, slabs"),
             Self::Lbvh => f.write_str("LBVH"),
-            Self::Rays(RayMethod::Query) => f.write_str("ray query"),
-            Self::Rays(RayMethod::Pipeline) => f.write_str("ray pipeline"),
+            Self::Rays(method) => f.write_str(method.name()),
         }
     }
 }

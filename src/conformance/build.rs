@@ -9,6 +9,7 @@ use super::twin::Twin;
 use crate::build::{BuildScratch, Capacity, DeviceMesh, Tree, TreeMemory, cmd_build};
 use crate::gpu::{Arena, BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
+use crate::named::named;
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::tree::stored::{split_entries, split_slabs};
 use crate::tree::{TreeArrays, TreeBytes};
@@ -35,20 +36,20 @@ pub(crate) enum Way {
     Shallow,
 }
 
-impl Way {
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Owned => "owned",
-            Self::Recorded => "recorded",
-            Self::Tight => "tight",
-            Self::Clipped => "clipped",
-            Self::Narrow => "narrow",
-            Self::Root => "root",
-            Self::Nothing => "nothing",
-            Self::Shallow => "shallow",
-        }
-    }
-}
+named!(
+    Way,
+    "way to build",
+    [
+        Owned = "owned",
+        Recorded = "recorded",
+        Tight = "tight",
+        Clipped = "clipped",
+        Narrow = "narrow",
+        Root = "root",
+        Nothing = "nothing",
+        Shallow = "shallow",
+    ]
+);
 
 /// A tree to build.
 #[derive(Clone, Copy, Debug)]

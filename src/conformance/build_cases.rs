@@ -89,7 +89,7 @@ pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
 fn build(cases: &mut Vec<Case>, group: Group, case: BuildCase) {
     let boxes = if case.boxes { "/boxes" } else { "" };
     let lists = case.lists.suffix();
-    let (mesh, assign, alpha, way) = (case.mesh.name, case.assign, case.alpha, case.way.name());
+    let (mesh, assign, alpha, way) = (case.mesh.name, case.assign, case.alpha, case.way);
     push(cases, format!("build/{mesh}/{assign}{lists}/alpha-{alpha}{boxes}/{way}{}", case.target.suffix()), group, Work::Build(case));
 }
 

@@ -2,6 +2,8 @@
 
 pub(crate) use crate::mesh::hash as mix;
 
+use crate::named::named;
+
 /// Kinds of sequences of keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Keys {
@@ -21,20 +23,13 @@ pub(crate) enum Keys {
     Dirty,
 }
 
-impl Keys {
-    /// Name in the names of cases.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Random => "random",
-            Self::Sorted => "sorted",
-            Self::Reversed => "reversed",
-            Self::Equal => "equal",
-            Self::Few => "few",
-            Self::Ones => "ones",
-            Self::Dirty => "dirty",
-        }
-    }
+named!(
+    Keys,
+    "kind of keys",
+    [Random = "random", Sorted = "sorted", Reversed = "reversed", Equal = "equal", Few = "few", Ones = "ones", Dirty = "dirty"]
+);
 
+impl Keys {
     /// Makes `n` keys of `bits` bits.
     pub(crate) fn make(self, n: u32, bits: u32) -> Vec<u32> {
         let mask = u32::MAX.checked_shr(32 - bits).unwrap_or(0);

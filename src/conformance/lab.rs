@@ -97,7 +97,6 @@ impl Lab {
     fn work(&mut self, work: &Work) -> Verdict {
         match work {
             Work::SelfTest => Ok(crate::primitives::self_test(&self.device)?),
-            Work::Reduce(case) => primitives::reduce(&self.gpu(case.target)?, *case),
             Work::Scan(case) => primitives::scan(&self.gpu(case.target)?, *case),
             Work::Sort(case) => primitives::sort(&self.gpu(case.target)?, *case),
             Work::Topology(recipe) => self.over(recipe, |gpu, twin, device| {

@@ -9,8 +9,7 @@
 //! any fault of the device; such a case passes, and its [`Report`] names the difference and two of the tetrahedra.
 //!
 //! ```text
-//! reduce/add/65537/host                    operation, length, where the count is known [, keys] [, target]
-//! scan/100003/indirect-below/narrow        length, count [, target]
+//! scan/100003/indirect-below/narrow        length, where the count is known [, target]
 //! sort/21-bits/100000/indirect/reversed    bits of the keys, length, count [, keys] [, target]
 //! mesh/two-share-face                      topology: bounds, bad cells, neighbours, boundary
 //! scan/100003/host/in-place/row-amd        … with the target for a kind of device
@@ -53,11 +52,12 @@ use locate::LocateCase;
 use meshes::MeshRecipe;
 use overlap::OverlapCase;
 use picture::PictureCase;
-use primitives::{ReduceCase, ScanCase, SortCase, TargetKind};
+use primitives::{ScanCase, SortCase, TargetKind};
 use ranges::RangesCase;
 use slice::SliceCase;
 
 use crate::mesh::Mesh;
+use crate::named::named;
 
 /// Group of cases by the time that they take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,16 +70,7 @@ pub enum Group {
     Large,
 }
 
-impl Group {
-    /// Name for filters and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Quick => "quick",
-            Self::Full => "full",
-            Self::Large => "large",
-        }
-    }
-}
+named!(Group, "group of cases", [Quick = "quick", Full = "full", Large = "large"]);
 
 /// One comparison.
 #[derive(Clone, Debug)]
@@ -95,7 +86,6 @@ pub struct Case {
 #[derive(Clone, Debug)]
 enum Work {
     SelfTest,
-    Reduce(ReduceCase),
     Scan(ScanCase),
     Sort(SortCase),
     Topology(MeshRecipe),
@@ -133,7 +123,7 @@ impl Case {
 
     /// Whether the case concerns a mesh rather than a primitive of the device.
     pub fn is_over_a_mesh(&self) -> bool {
-        !matches!(self.work, Work::SelfTest | Work::Reduce(_) | Work::Scan(_) | Work::Sort(_))
+        !matches!(self.work, Work::SelfTest | Work::Scan(_) | Work::Sort(_))
     }
 }
 

@@ -7,6 +7,7 @@ use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, kuhn_jittered};
+use crate::named::named;
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::{SILENT, overlap};
 use crate::reference::boundary::{Topology, topology};
@@ -33,14 +34,7 @@ pub(crate) enum Other {
     Itself,
 }
 
-impl Other {
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Grid => "grid",
-            Self::Itself => "itself",
-        }
-    }
-}
+named!(Other, "other mesh", [Grid = "grid", Itself = "itself"]);
 
 /// A mesh with its tree, on host and device.
 #[derive(Debug)]

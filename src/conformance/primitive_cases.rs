@@ -1,10 +1,9 @@
 //! The list of cases for primitives.
 
 use super::data::Keys;
-use super::primitives::{Live, ReduceCase, ScanCase, SortCase, TargetKind};
+use super::primitives::{Live, ScanCase, SortCase, TargetKind};
 use super::{Case, Group, Work};
 use crate::kernels::DeviceClass;
-use crate::primitives::Reduction;
 
 /// Lengths around subgroups, workgroups and tiles of every target, around powers of two, and primes.
 const LENGTHS: [u32; 40] = [
@@ -17,7 +16,6 @@ const FEW: [u32; 9] = [0, 1, 33, 255, 4096, 4097, 8193, 65_537, 100_000];
 const LONG: [u32; 3] = [1_048_576, 1_000_003, 4_194_305];
 /// More than 2^26 words.
 const LARGE: u32 = (1 << 26) + 12_347;
-const COUNTS: [Live; 5] = [Live::Host, Live::All, Live::Below, Live::Zero, Live::Above];
 const TARGETS: [TargetKind; 3] = [TargetKind::Serial, TargetKind::Ballot, TargetKind::Narrow];
 
 fn is_few(n: u32) -> bool {
@@ -27,24 +25,11 @@ fn is_few(n: u32) -> bool {
 pub(super) fn add(cases: &mut Vec<Case>) {
     let lengths = || LENGTHS.into_iter().chain([100_000]).chain(LONG);
     let group = |n: u32, quick: bool| if quick && n < 1 << 20 { Group::Quick } else { Group::Full };
-    for operation in [Reduction::Add, Reduction::Min, Reduction::Max] {
-        let keys = if operation == Reduction::Add { Keys::Random } else { Keys::Reversed };
-        for target in TARGETS {
-            for n in lengths() {
-                let quick = target != TargetKind::Narrow && (is_few(n) || operation == Reduction::Add);
-                reduce(cases, group(n, quick), ReduceCase { operation, n, live: Live::Host, keys, target });
-            }
-            for live in COUNTS {
-                reduce(cases, Group::Quick, ReduceCase { operation, n: 10_000, live, keys, target });
-            }
-        }
-        reduce(cases, Group::Large, ReduceCase { operation, n: LARGE, live: Live::Host, keys, target: TargetKind::Device });
-    }
     for target in TARGETS {
         for n in lengths() {
             scan(cases, group(n, true), ScanCase { n, live: Live::Host, in_place: false, target });
         }
-        for live in COUNTS {
+        for live in Live::EVERY {
             for n in [1, 10_000, 100_003] {
                 scan(cases, Group::Quick, ScanCase { n, live, in_place: true, target });
             }
@@ -67,12 +52,12 @@ pub(super) fn add(cases: &mut Vec<Case>) {
             sort(cases, few, SortCase { bits: 21, n, live: Live::Host, keys: Keys::Random, target });
             sort(cases, Group::Full, SortCase { bits: 30, n, live: Live::All, keys: Keys::Random, target });
         }
-        for live in COUNTS {
+        for live in Live::EVERY {
             for bits in [15, 30] {
                 sort(cases, Group::Quick, SortCase { bits, n: 10_000, live, keys: Keys::Random, target });
             }
         }
-        for keys in [Keys::Sorted, Keys::Reversed, Keys::Equal, Keys::Few, Keys::Ones, Keys::Dirty] {
+        for keys in Keys::EVERY.into_iter().filter(|&keys| keys != Keys::Random) {
             sort(cases, Group::Quick, SortCase { bits: 12, n: 33_333, live: Live::All, keys, target });
             sort(cases, Group::Full, SortCase { bits: 32, n: 100_000, live: Live::Host, keys, target });
         }
@@ -88,25 +73,15 @@ pub(super) fn add(cases: &mut Vec<Case>) {
     sort(cases, Group::Large, SortCase { bits: 30, n: LARGE, live: Live::All, keys: Keys::Random, target: TargetKind::Device });
 }
 
-fn reduce(cases: &mut Vec<Case>, group: Group, case: ReduceCase) {
-    let operation = match case.operation {
-        Reduction::Add => "add",
-        Reduction::Min => "min",
-        Reduction::Max => "max",
-    };
-    let name = format!("reduce/{operation}/{}/{}{}", case.n, case.live.name(), case.target.suffix());
-    push(cases, name, group, Work::Reduce(case));
-}
-
 fn scan(cases: &mut Vec<Case>, group: Group, case: ScanCase) {
     let place = if case.in_place { "/in-place" } else { "" };
-    let name = format!("scan/{}/{}{place}{}", case.n, case.live.name(), case.target.suffix());
+    let name = format!("scan/{}/{}{place}{}", case.n, case.live, case.target.suffix());
     push(cases, name, group, Work::Scan(case));
 }
 
 fn sort(cases: &mut Vec<Case>, group: Group, case: SortCase) {
-    let keys = if case.keys == Keys::Random { String::new() } else { format!("/{}", case.keys.name()) };
-    let name = format!("sort/{}-bits/{}/{}{keys}{}", case.bits, case.n, case.live.name(), case.target.suffix());
+    let keys = if case.keys == Keys::Random { String::new() } else { format!("/{}", case.keys) };
+    let name = format!("sort/{}-bits/{}/{}{keys}{}", case.bits, case.n, case.live, case.target.suffix());
     push(cases, name, group, Work::Sort(case));
 }
 

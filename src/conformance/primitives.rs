@@ -1,11 +1,12 @@
-//! Cases that compare reduce, scan and sort with their definitions.
+//! Cases that compare scan and sort with their definitions.
 
 use super::buffers::{FILL, Guarded};
 use super::data::Keys;
 use super::failure::{Verdict, compare};
 use crate::gpu::{Arena, Gpu};
 use crate::kernels::{DeviceClass, ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
-use crate::primitives::{Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs};
+use crate::named::named;
+use crate::primitives::{Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
 
 /// The target with which a case runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -71,17 +72,13 @@ pub(crate) enum Live {
     Above,
 }
 
-impl Live {
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Host => "host",
-            Self::All => "indirect",
-            Self::Below => "indirect-below",
-            Self::Zero => "indirect-zero",
-            Self::Above => "indirect-above",
-        }
-    }
+named!(
+    Live,
+    "kind of count",
+    [Host = "host", All = "indirect", Below = "indirect-below", Zero = "indirect-zero", Above = "indirect-above"]
+);
 
+impl Live {
     /// The number stored on the device, and the number of items that it means.
     fn numbers(self, n: u32) -> (u32, u32) {
         match self {
@@ -99,16 +96,6 @@ impl Live {
         let count = if self == Self::Host { Count::host(n) } else { Count::device(n, memory.all()) };
         Ok((count, memory, items as usize))
     }
-}
-
-/// A reduction.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ReduceCase {
-    pub operation: Reduction,
-    pub n: u32,
-    pub live: Live,
-    pub keys: Keys,
-    pub target: TargetKind,
 }
 
 /// An exclusive scan.
@@ -129,25 +116,6 @@ pub(crate) struct SortCase {
     pub live: Live,
     pub keys: Keys,
     pub target: TargetKind,
-}
-
-pub(crate) fn reduce(gpu: &Gpu, case: ReduceCase) -> Verdict {
-    let data = case.keys.make(case.n, 32);
-    let (count, _word, items) = case.live.count(gpu, case.n)?;
-    let values = Guarded::new(gpu, "olbvh.conformance.values", &data, 0)?;
-    let result = Guarded::new(gpu, "olbvh.conformance.result", &[], 1)?;
-    let scratch = Guarded::scratch(gpu, "olbvh.conformance.scratch", REDUCE_SCRATCH)?;
-    gpu.submit("olbvh.conformance.reduce", |r| cmd_reduce(r, case.operation, values.all(), result.all(), count, scratch.all()))?;
-    let live = data[..items].iter().copied();
-    let expected = match case.operation {
-        Reduction::Add => live.fold(0, u32::wrapping_add),
-        Reduction::Min => live.fold(u32::MAX, u32::min),
-        Reduction::Max => live.fold(0, u32::max),
-    };
-    let stage = "primitives.reduce";
-    scratch.check_guard(gpu, stage)?;
-    compare(stage, "values", &data, &values.read(gpu, stage)?)?;
-    compare(stage, "result", &[expected], &result.read(gpu, stage)?)
 }
 
 pub(crate) fn scan(gpu: &Gpu, case: ScanCase) -> Verdict {

@@ -194,6 +194,6 @@ fn add_overlaps(cases: &mut Vec<Case>, mesh: MeshRecipe) {
 
 fn add_overlap(cases: &mut Vec<Case>, group: Group, case: OverlapCase) {
     let OverlapCase { mesh, alpha, assign, lists, other } = case;
-    let name = format!("overlap/{}/{assign}{}/alpha-{alpha}/{}", mesh.name, lists.suffix(), other.name());
+    let name = format!("overlap/{}/{assign}{}/alpha-{alpha}/{other}", mesh.name, lists.suffix());
     push(cases, name, group, Work::Overlap(case));
 }

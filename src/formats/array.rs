@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::budget::Budget;
-use super::loss::Loss;
+use super::loss::{Loss, MOST_COMPONENTS};
 use crate::mesh::{Field, On};
 
 /// An array of a file: `components` values per point or per cell of the file.
@@ -65,9 +65,6 @@ impl Array {
         suffixes(self.components)
     }
 }
-
-/// Most components of an array that becomes fields.
-pub(crate) const MOST_COMPONENTS: usize = 9;
 
 /// Suffixes of the fields that an array becomes: its components, and before those of a vector, its length.
 pub(crate) fn suffixes(components: usize) -> &'static [&'static str] {

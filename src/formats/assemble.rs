@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::array::{Array, MOST_COMPONENTS, Names, length};
+use super::array::{Array, Names, length};
 use super::budget::Budget;
 use super::cells::ghost;
+use super::loss::MOST_COMPONENTS;
 use super::report::{CellCount, Fate, Report};
 use super::source::{Source, excerpt};
 use super::{Curved, LoadOptions, Merge};

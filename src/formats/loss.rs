@@ -1,11 +1,13 @@
 //! What single precision loses of the values of an array.
 
-use super::array::MOST_COMPONENTS;
 use super::scalar::Scalar;
 use crate::error::Result;
 
 /// Values whose range is less than this part of the largest are equal but for rounding in double precision.
 const NOISE: f64 = 1e-12;
+
+/// Most components of an array that becomes fields.
+pub(crate) const MOST_COMPONENTS: usize = 9;
 
 /// What is known of the values in the file, from which an array was rounded.
 #[derive(Clone, Copy, Default)]

@@ -6,6 +6,7 @@ use super::constants::Constants;
 use super::foundation::Foundation;
 use super::heap::Heap;
 use super::kept::Kept;
+use super::kernel::KernelInfo;
 use super::ledger::Ledger;
 use super::pipelines::{Pipelines, cache_file};
 use super::pool::Pool;
@@ -254,9 +255,8 @@ impl Gpu {
     }
 
     /// Subgroup size that the pipeline of a kernel is compiled for.
-    pub(super) fn subgroup_size_of(&self, kernel: &str) -> u32 {
-        let asks = ["olbvh.query.", "olbvh.baseline."].iter().any(|room| kernel.starts_with(room));
-        if asks { self.report().query_subgroup } else { self.subgroup_size() }
+    pub(super) fn subgroup_size_of(&self, kernel: &KernelInfo) -> u32 {
+        if kernel.for_queries { self.report().query_subgroup } else { self.subgroup_size() }
     }
 
     /// Messages of validation layers so far; always empty without a layer.

@@ -33,6 +33,8 @@ pub(crate) struct KernelInfo {
     pub descriptor: &'static [u8],
     pub buffers: &'static [BufferInfo],
     pub scalar_bytes: usize,
+    /// Whether it belongs to queries, or to the baselines that they are compared with.
+    pub for_queries: bool,
 }
 
 /// Specialization constants as pairs (id, value).
@@ -168,7 +170,7 @@ fn compile(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)], made: &mut Pi
             .module(module)
             .name(c"main")
             .specialization_info(&specialization);
-        let size = gpu.subgroup_size_of(info.name);
+        let size = gpu.subgroup_size_of(info);
         let mut required = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default().required_subgroup_size(size);
         if gpu.requires_subgroup_size() {
             // Where the driver may choose the subgroup size, `gl_SubgroupSize` and the lanes that run can differ:

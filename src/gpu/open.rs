@@ -68,7 +68,8 @@ fn devices(instance: &ash::Instance) -> Result<Vec<(vk::PhysicalDevice, DeviceRe
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.enumerate_physical_devices() }.map_err(failed("vkEnumeratePhysicalDevices"))?;
     // SAFETY: the handles are those of the instance.
-    Ok(devices.into_iter().map(|d| (d, unsafe { DeviceReport::new(instance, d) })).collect())
+    let report = |d| unsafe { DeviceReport::of(instance, d, Requirements::check(instance, d)) };
+    Ok(devices.into_iter().map(|d| (d, report(d))).collect())
 }
 
 /// The requested device, or the best one that meets the requirements.

@@ -306,16 +306,7 @@ unsafe fn traces_rays(instance: &ash::Instance, device: vk::PhysicalDevice, list
 }
 
 impl DeviceReport {
-    /// Reads a device's properties and checks its requirements.
-    ///
-    /// # Safety
-    /// As for [`Requirements::check`].
-    pub(super) unsafe fn new(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
-        // SAFETY: the caller promises that the handle is one of this instance.
-        unsafe { Self::of(instance, device, Requirements::check(instance, device)) }
-    }
-
-    /// Reads a device's properties, with requirements that were reduced to what is enabled.
+    /// Reads a device's properties. Its requirements are as checked, or reduced to what is enabled.
     ///
     /// # Safety
     /// As for [`Requirements::check`].

@@ -1,9 +1,8 @@
-//! Reduce, exclusive scan and stable radix sort on the device, as functions that append to a recorder.
+//! Exclusive scan and stable radix sort on the device, as functions that append to a recorder.
 
 #[cfg(feature = "cli")]
 mod copy;
 mod fill;
-mod reduce;
 mod scan;
 mod selftest;
 mod sort;
@@ -11,7 +10,6 @@ mod sort;
 #[cfg(feature = "cli")]
 pub(crate) use copy::cmd_copy;
 pub(crate) use fill::cmd_fill;
-pub use reduce::{REDUCE_SCRATCH, Reduction, cmd_reduce};
 pub use scan::{ScanScratch, cmd_exclusive_scan};
 pub(crate) use selftest::self_test;
 pub use sort::{SortScratch, cmd_sort_pairs};

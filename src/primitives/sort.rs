@@ -78,6 +78,9 @@ pub(crate) struct Unsorted {
     pub values: BufferRef,
     sorted: (BufferRef, BufferRef),
     bits: u32,
+    /// Not 0: the last tile begins first.
+    #[cfg(test)]
+    backwards: u32,
 }
 
 impl Unsorted {
@@ -88,7 +91,14 @@ impl Unsorted {
         let sorted = (keys, values);
         let elsewhere = !target.serial && bits > 0 && max > 1 && target.passes(bits).0 % 2 == 1;
         let (keys, values) = if elsewhere { scratch.apart(max) } else { sorted };
-        Self { keys, values, sorted, bits }
+        Self {
+            keys,
+            values,
+            sorted,
+            bits,
+            #[cfg(test)]
+            backwards: 0,
+        }
     }
 }
 
@@ -121,10 +131,6 @@ pub fn cmd_sort_pairs(
 
 /// Sorts pairs that were written to their first place, as [`cmd_sort_pairs`] does.
 pub(crate) fn cmd_sort(r: &mut Recorder<'_>, pairs: &Unsorted, count: Count, scratch: &SortScratch) -> Result<()> {
-    cmd_sort_tiles(r, pairs, count, scratch, 0)
-}
-
-fn cmd_sort_tiles(r: &mut Recorder<'_>, pairs: &Unsorted, count: Count, scratch: &SortScratch, backwards: u32) -> Result<()> {
     let bits = pairs.bits;
     if bits == 0 || count.max < 2 {
         return Ok(());
@@ -152,7 +158,7 @@ fn cmd_sort_tiles(r: &mut Recorder<'_>, pairs: &Unsorted, count: Count, scratch:
         None => Count::host(table_max),
     };
     let sort = PairSort { pairs, count, live, passes, digit_bits, bits, groups, table, scratch };
-    if target.serial { sort.cmd_serial(r, target) } else { sort.cmd_ballot(r, target, backwards) }
+    if target.serial { sort.cmd_serial(r, target) } else { sort.cmd_ballot(r, target) }
 }
 
 /// What all passes of a sort have in common.
@@ -209,8 +215,7 @@ impl PairSort<'_> {
     }
 
     /// Tiles of whole workgroups. Pairs are read and written once per pass, and their digits are counted once for all.
-    /// `backwards`: 1 if the last tile begins first, else 0.
-    fn cmd_ballot(&self, r: &mut Recorder<'_>, target: SortTarget, backwards: u32) -> Result<()> {
+    fn cmd_ballot(&self, r: &mut Recorder<'_>, target: SortTarget) -> Result<()> {
         let Self { pairs, live, passes, digit_bits, groups, .. } = *self;
         let (count, workgroup, rows) = (self.count.max, target.workgroup, target.rows);
         let max_subgroups = workgroup / r.gpu().subgroup_size().max(1);
@@ -218,6 +223,9 @@ impl PairSort<'_> {
         let totals = self.scratch.totals.part(0, 4 * totals(passes, digit_bits));
         let (mut from, mut to) = ((pairs.keys, pairs.values), if passes % 2 == 1 { pairs.sorted } else { self.scratch.apart(count) });
         let (mut chain, mut next_chain) = (table, second);
+        let spec = SortScatterBallotSpec { workgroup, rows, digit_bits, max_subgroups, ..Default::default() };
+        #[cfg(test)]
+        let spec = SortScatterBallotSpec { backwards: pairs.backwards, ..spec };
         r.fill(totals, 0);
         r.barrier("sort.clear → sort.digits");
         let digits = SortDigitsBallot { live, keys: from.0, totals, chain, count, last_mask: self.digit(passes - 1).1 };
@@ -242,7 +250,7 @@ impl PairSort<'_> {
                 shift,
                 mask,
             };
-            r.dispatch(&scatter, SortScatterBallotSpec { workgroup, rows, digit_bits, max_subgroups, backwards }, groups)?;
+            r.dispatch(&scatter, spec, groups)?;
             std::mem::swap(&mut from, &mut to);
             std::mem::swap(&mut chain, &mut next_chain);
         }
@@ -273,9 +281,9 @@ mod tests {
         let (_memory, scratch) = Arena::reserve(&gpu, "olbvh.test.scratch", carve).unwrap();
         for backwards in [0, 1] {
             let (keys, values) = (gpu.upload("olbvh.test.keys", &keys).unwrap(), gpu.upload("olbvh.test.values", &ids).unwrap());
-            let pairs = Unsorted::place(&gpu, (keys.all(), values.all()), bits, n, &scratch);
+            let pairs = Unsorted { backwards, ..Unsorted::place(&gpu, (keys.all(), values.all()), bits, n, &scratch) };
             assert!(pairs.keys == keys.all(), "an even number of passes");
-            gpu.submit("olbvh.test.sort", |r| cmd_sort_tiles(r, &pairs, Count::host(n), &scratch, backwards)).unwrap();
+            gpu.submit("olbvh.test.sort", |r| cmd_sort(r, &pairs, Count::host(n), &scratch)).unwrap();
             assert!(gpu.download::<u32>(&values, values.all()).unwrap() == expected, "backwards: {backwards}");
         }
     }

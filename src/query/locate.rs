@@ -13,10 +13,10 @@ use crate::options::{POINT_CHUNK, POINT_RUN, TOLERANCE};
 use crate::reference::traverse::full_stack;
 use crate::times::StageTimes;
 
+pub use crate::layout::constants::locate_by_traversal::MOST_TRAVERSED;
+
 /// Size of the largest useful short stack: at most seven siblings per level wait on it, so it never drops a node.
 const MAX_STACK: u32 = full_stack(MAX_LEVEL) as u32;
-/// Most entries of a list for [`LocateMethod::Traversal`]: so many that no loop gets too long for a driver.
-pub const MOST_TRAVERSED: u32 = 32_000;
 
 /// How the owner of a point is searched for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -190,11 +190,8 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 stride,
                 tolerance,
             };
-            return r.dispatch(
-                &arguments,
-                LocateByTraversalSpec { workgroup, stack: stack.min(MAX_STACK), lists, most: MOST_TRAVERSED, ..Default::default() },
-                groups(1),
-            );
+            let spec = LocateByTraversalSpec { workgroup, stack: stack.min(MAX_STACK), lists, ..Default::default() };
+            return r.dispatch(&arguments, spec, groups(1));
         }
         let (length, parts) = list_parts(r.gpu().report().kind, scene.longest_leaf);
         for part in 0..parts {

@@ -30,9 +30,10 @@ pub use crate::reference::overlap::{Effort, Overlap};
 
 use crate::build::{MeshInput, MeshView, Tree, TreeMemory};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, DeviceKind, Gpu};
+use crate::gpu::{Buffer, BufferRef, DeviceKind, Gpu, Recorder};
 use crate::mesh::On;
 use crate::options::LIST_PART;
+use crate::times::StageTimes;
 
 /// Receives the progress of an owning call: how much is done, and the total. Each call says what it counts. An error ends the
 /// call, which returns it: [`Error::Cancelled`] to stop, from another thread or a window, between two submissions.
@@ -69,6 +70,26 @@ impl Rounds {
             return Err(Error::Invalid("a query that begins with no rounds; it takes at least one".into()));
         }
         Ok(())
+    }
+}
+
+/// Submits rounds until `read` returns what it has read back of finished work; it returns `None` if more rounds are needed. A
+/// submission has `at_once` of them. `times` receives what they take.
+pub(crate) fn until_done<T>(
+    gpu: &Gpu,
+    label: &'static str,
+    at_once: u32,
+    times: &mut StageTimes,
+    record: impl Fn(&mut Recorder<'_>, Rounds) -> Result<()>,
+    read: impl Fn() -> Result<Option<T>>,
+) -> Result<T> {
+    let mut rounds = Rounds::begin(at_once);
+    loop {
+        times.add(gpu.submit(label, |r| record(r, rounds))?.1);
+        if let Some(done) = read()? {
+            return Ok(done);
+        }
+        rounds = Rounds::resume(at_once);
     }
 }
 

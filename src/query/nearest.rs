@@ -1,6 +1,6 @@
 //! The place of the mesh's surface that is closest to each point, wherever the point lies.
 
-use super::{PointInput, Progress, Rounds, Scene};
+use super::{PointInput, Progress, Rounds, Scene, until_done};
 use crate::build::Tree;
 use crate::error::Result;
 use crate::gpu::{Arena, BufferRef, Groups, Recorder};
@@ -159,18 +159,13 @@ pub(crate) fn nearest_in(tree: &Tree, points: &[[f32; 3]], within: f32, cells: O
         let asked = gpu.upload("olbvh.query.points", chunk)?;
         let count = chunk.len() as u32;
         let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
-        let mut rounds = Rounds::begin(1);
-        loop {
-            let ((), times) = gpu.submit("olbvh.query.nearest", |r| cmd_nearest_in(r, &scene, &input, (within, cells), &memory, rounds))?;
-            all.times.add(times);
+        let record = |r: &mut Recorder<'_>, rounds| cmd_nearest_in(r, &scene, &input, (within, cells), &memory, rounds);
+        until_done(gpu, "olbvh.query.nearest", 1, &mut all.times, record, || {
             let unfinished: u32 = gpu.download_one(&buffer, memory.unfinished)?;
             report(all.owners.len() as u64 + u64::from(count - unfinished.min(count)), points.len() as u64)?;
-            if unfinished == 0 {
-                break;
-            }
-            rounds = Rounds::resume(1);
-        }
-        let states: Vec<NearState> = gpu.download(&buffer, memory.states.part(0, 16 * u64::from(count)))?;
+            Ok((unfinished == 0).then_some(()))
+        })?;
+        let states: Vec<NearState> = gpu.download(&buffer, memory.states.part(0, size_of::<NearState>() as u64 * u64::from(count)))?;
         all.owners.extend(states.iter().map(|state| state.owner));
         all.squares.extend(states.iter().map(|state| state.square));
         all.barycentrics.extend(gpu.download::<[f32; 4]>(&buffer, memory.barycentrics.part(0, 16 * u64::from(count)))?);
@@ -219,7 +214,7 @@ mod tests {
                     rounds = Rounds::resume(1);
                     count += 1;
                 }
-                let states: Vec<NearState> = gpu.download(&buffer, memory.states.part(0, 16 * points.len() as u64)).unwrap();
+                let states: Vec<NearState> = gpu.download(&buffer, memory.states).unwrap();
                 let wrong = (0..points.len()).filter(|&i| (states[i].owner, states[i].square) != expected[i]).count();
                 assert!(wrong == 0 && count > 3, "level {level}, budget {budget}: {wrong} wrong after {count} rounds");
             }

@@ -18,7 +18,7 @@ mod sets;
 pub use pairs::{PairMemory, cmd_count_pairs, cmd_list_pairs};
 pub use sets::{OverlapMemory, cmd_overlap};
 
-use super::{Progress, Rounds, Scene};
+use super::{Progress, Scene, until_done};
 use crate::build::Tree;
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, Gpu, Recorder};
@@ -55,81 +55,62 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Submits what `record` records, and waits for it.
-    fn submit(&mut self, record: impl FnOnce(&mut Recorder<'_>, &[Scene; 2]) -> Result<()>) -> Result<()> {
-        let ((), times) = self.gpu.submit("olbvh.query.overlap", |r| record(r, &self.scenes))?;
-        self.done.times.add(times);
-        Ok(())
-    }
-
     fn sets(&mut self) -> Result<()> {
-        let [a, b] = &self.scenes;
+        let (gpu, [a, b], done) = (self.gpu, &self.scenes, &mut self.done);
         let carve = |arena: &mut Arena| OverlapMemory::carve(arena, a, b);
-        let (buffer, memory) = Arena::reserve(self.gpu, "olbvh.query.overlap", carve)?;
+        let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.overlap", carve)?;
         let at_once = rounds_at_once(a.mesh.input.tets.max(b.mesh.input.tets));
-        let mut rounds = Rounds::begin(at_once);
-        let statuses = loop {
-            self.submit(|r, [a, b]| cmd_overlap(r, a, b, &memory, rounds))?;
-            let statuses = memory.frames.statuses(self.gpu, &buffer)?;
-            rounds = Rounds::resume(at_once);
+        let record = |r: &mut Recorder<'_>, rounds| cmd_overlap(r, a, b, &memory, rounds);
+        let statuses = until_done(gpu, "olbvh.query.overlap", at_once, &mut done.times, record, || {
+            let statuses = memory.frames.statuses(gpu, &buffer)?;
             let sum = |pick: fn(&OverlapStatus) -> u32| statuses.iter().map(|s| u64::from(pick(s))).sum::<u64>();
             let (waiting, unfinished) = (sum(|s| s.waiting), sum(|s| s.unfinished));
             (self.report)(waiting.saturating_sub(unfinished), waiting)?;
-            if unfinished == 0 {
-                break statuses;
-            }
-        };
+            Ok((unfinished == 0).then_some(statuses))
+        })?;
         let hits = |i: usize| {
             let words = u64::from(self.scenes[i].mesh.input.tets.div_ceil(32));
-            Ok::<_, Error>(set_bits(self.gpu.download(&buffer, memory.hits[i].part(0, 4 * words))?))
+            Ok::<_, Error>(set_bits(gpu.download(&buffer, memory.hits[i].part(0, 4 * words))?))
         };
-        let (a, b) = (hits(0)?, hits(1)?);
-        (self.done.overlap.a, self.done.overlap.b) = (a, b);
-        for (of, status) in self.done.overlap.effort.iter_mut().zip(&statuses) {
+        (done.overlap.a, done.overlap.b) = (hits(0)?, hits(1)?);
+        for (of, status) in done.overlap.effort.iter_mut().zip(&statuses) {
             *of = effort(status);
         }
         Ok(())
     }
 
     fn pairs(&mut self) -> Result<()> {
-        let tets = self.scenes[0].mesh.input.tets;
-        let carve = |arena: &mut Arena| PairMemory::carve(self.gpu, arena, tets);
-        let (buffer, memory) = Arena::reserve(self.gpu, "olbvh.query.overlap_counts", carve)?;
+        let (gpu, [a, b], done) = (self.gpu, &self.scenes, &mut self.done);
+        let tets = a.mesh.input.tets;
+        let carve = |arena: &mut Arena| PairMemory::carve(gpu, arena, tets);
+        let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.overlap_counts", carve)?;
         // In the first pass pairs are counted, in the second they are written.
         let (report, n) = (self.report, u64::from(tets));
         let tell = |passes: u64, left: u32| report((passes * n).saturating_sub(left.into()), 2 * n);
-        let mut rounds = Rounds::begin(1);
-        let status = loop {
-            self.submit(|r, [a, b]| cmd_count_pairs(r, a, b, &memory, rounds))?;
-            let status: OverlapStatus = self.gpu.download_one(&buffer, memory.status)?;
-            rounds = Rounds::resume(1);
+        let record = |r: &mut Recorder<'_>, rounds| cmd_count_pairs(r, a, b, &memory, rounds);
+        let status = until_done(gpu, "olbvh.query.overlap", 1, &mut done.times, record, || {
+            let status: OverlapStatus = gpu.download_one(&buffer, memory.status)?;
             tell(1, status.unfinished)?;
-            if status.unfinished == 0 {
-                break status;
-            }
-        };
-        self.done.overlap.effort[0] = effort(&status);
+            Ok((status.unfinished == 0).then_some(status))
+        })?;
+        done.overlap.effort[0] = effort(&status);
         if wide(status.pairs) > i32::MAX as u64 {
             return Err(Error::TooLarge(format!("{} intersecting pairs; shaders number {} at most", wide(status.pairs), i32::MAX)));
         }
-        let found = self.gpu.buffer("olbvh.query.overlap_found", 8 * u64::from(status.pairs[0]))?;
-        let mut rounds = Rounds::begin(1);
-        loop {
-            self.submit(|r, [a, b]| cmd_list_pairs(r, a, b, &memory, found.all(), rounds))?;
-            let status: OverlapStatus = self.gpu.download_one(&buffer, memory.status)?;
-            rounds = Rounds::resume(1);
+        let found = gpu.buffer("olbvh.query.overlap_found", 8 * u64::from(status.pairs[0]))?;
+        let record = |r: &mut Recorder<'_>, rounds| cmd_list_pairs(r, a, b, &memory, found.all(), rounds);
+        until_done(gpu, "olbvh.query.overlap", 1, &mut done.times, record, || {
+            let status: OverlapStatus = gpu.download_one(&buffer, memory.status)?;
             tell(2, status.unfilled)?;
-            if status.unfilled == 0 {
-                break;
-            }
-        }
-        let mut pairs: Vec<[u32; 2]> = self.gpu.download(&found, found.all())?;
+            Ok((status.unfilled == 0).then_some(()))
+        })?;
+        let mut pairs: Vec<[u32; 2]> = gpu.download(&found, found.all())?;
         // Pairs are ascending by A already. Within a tetrahedron of A they are in the order of B's leaves, and with
         // filtered assignments a pair may occur more than once.
         pairs.chunk_by_mut(|x, y| x[0] == y[0]).for_each(<[_]>::sort_unstable);
         pairs.dedup();
-        (self.done.overlap.a, self.done.overlap.b) = members(&pairs);
-        self.done.overlap.pairs = Some(pairs);
+        (done.overlap.a, done.overlap.b) = members(&pairs);
+        done.overlap.pairs = Some(pairs);
         Ok(())
     }
 }

@@ -25,14 +25,10 @@ use crate::kernels::{
 };
 use crate::layout::{RunState, SliceStatus, SliceUniforms, TouchState};
 use crate::mesh::On;
-use crate::options::TOLERANCE;
 use crate::primitives::Count;
-use crate::slicing::{Extrapolate, Rows, VOXEL_RUN, VoxelGrid, WALK};
+use crate::slicing::{Extrapolate, Rows, VoxelGrid};
 use std::mem::offset_of;
 
-/// Entries, nodes and tetrahedra of walks that one run of voxels may test in one dispatch, roughly. A test takes up to
-/// five passes of loops, and some drivers end the loops of an invocation after 65,535 passes in all.
-const LOCATE_BUDGET: u32 = 8192;
 /// Nodes and entries that one voxel may test in one dispatch.
 const TOUCH_BUDGET: u32 = 1024;
 
@@ -200,8 +196,7 @@ fn cmd_locate_voxels(
 ) -> Result<()> {
     let (cells, arrays) = (searched.mesh.input.cells, &searched.mesh.arrays);
     let groups = Groups::Count(input.runs().div_ceil(r.gpu().target().query));
-    let (run, walk, part, lists) = (VOXEL_RUN, WALK, u32::from(part), searched.lists());
-    let (budget, tolerance) = (LOCATE_BUDGET, TOLERANCE.to_bits());
+    let (part, lists) = (u32::from(part), searched.lists());
     let (buffer, field, on_cells) = of_field(r, input);
     r.stage("query.slice_locate", |r| {
         dispatch!(r, groups, searched, SliceLocate SliceLocateSpec {} { lists }, LbvhSliceLocate LbvhSliceLocateSpec, {
@@ -215,7 +210,7 @@ fn cmd_locate_voxels(
             field: buffer,
             values: memory.values,
             fresh: u32::from(fresh),
-        }, { run, walk, part, budget, tolerance, field, on_cells })
+        }, { part, field, on_cells })
     })
 }
 
@@ -234,8 +229,7 @@ fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMem
         let SliceMemory { answers, status, plan: plans, runs, touches: states, .. } = *memory;
         let ([width, height], rows) = (input.voxels.size, input.rows.count);
         let collect = SliceCollect { answers, status, plans, runs, states, width, height, rows };
-        let spec = SliceCollectSpec { workgroup, run: VOXEL_RUN, ..Default::default() };
-        r.dispatch(&collect, spec, Groups::Count(input.runs().div_ceil(workgroup)))?;
+        r.dispatch(&collect, SliceCollectSpec { workgroup, ..Default::default() }, Groups::Count(input.runs().div_ceil(workgroup)))?;
         r.barrier("slice.collect → slice.arguments");
         let listed = Count::device(voxels, plans.part(offset_of!(SliceUniforms, listed) as u64, 16));
         let groups = listed.groups(r, workgroup, memory.groups, "slice.arguments → slice.touch")?;

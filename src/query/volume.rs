@@ -30,10 +30,6 @@ use crate::primitives::Count;
 use crate::render::{PicturePlan, TABLE_SIZE};
 use std::mem::offset_of;
 
-/// Entries, nodes, and tetrahedra on and around walks that one ray may test in one dispatch, roughly.
-const BUDGET: u32 = 1024;
-/// Nodes on the short stack of the traversal.
-const STACK: u32 = 8;
 /// Cells of [`TOP_LEVEL`].
 const TOP_CELLS: usize = 1 << (3 * TOP_LEVEL);
 /// Side, in pixels, of the square blocks that a picture is drawn in.
@@ -335,7 +331,7 @@ fn cmd_intervals(
 ) -> Result<()> {
     let searched = &marks.map_or(*searched, |marks| searched.with_flags(marks.visible));
     let (mesh, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
-    let (stack, part, iso) = (STACK, u32::from(part), u32::from(input.iso));
+    let (part, iso) = (u32::from(part), u32::from(input.iso));
     let (depth, depths) = input.depths(r);
     let groups = Groups::Count(rays.div_ceil(r.gpu().target().query));
     r.stage("query.intervals", |r| {
@@ -348,7 +344,7 @@ fn cmd_intervals(
             depths: depths,
             status: memory.status,
             items: rays,
-        }, { stack, part, iso, depth })
+        }, { part, iso, depth })
     })
 }
 
@@ -364,7 +360,7 @@ fn cmd_march(
     let (mesh, arrays, (field, on)) = (&searched.mesh.input, &searched.mesh.arrays, input.field);
     let (shading, on_cells, lists) = (u32::from(input.normals.is_some()), u32::from(on == On::Cells), searched.lists());
     let (iso, skip, normals) = (u32::from(input.iso), u32::from(marks.is_some()), input.normals.unwrap_or_else(|| r.gpu().nothing()));
-    let ((depth, depths), budget) = (input.depths(r), BUDGET);
+    let (depth, depths) = input.depths(r);
     r.stage("query.march", |r| {
         dispatch!(r, groups, searched, VolumeMarch VolumeMarchSpec {} { lists, skip }, LbvhMarch LbvhMarchSpec, {
             cells: mesh.cells,
@@ -377,7 +373,7 @@ fn cmd_march(
             colors: memory.colors,
             status: memory.status,
             depths: depths,
-        }, { shading, on_cells, iso, depth, budget })
+        }, { shading, on_cells, iso, depth })
     })
 }
 

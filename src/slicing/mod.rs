@@ -24,6 +24,8 @@ use crate::named::named;
 use glam::DVec3;
 use std::ops::Range;
 
+pub use crate::layout::constants::voxels::VOXEL_RUN;
+
 /// Kind of a voxel that the mesh does not touch.
 pub const EMPTY: u8 = 0;
 /// Kind of a voxel whose box the mesh touches, but whose centre lies outside.
@@ -31,11 +33,6 @@ pub const TOUCHED: u8 = 1;
 /// Kind of a voxel whose centre lies in the mesh.
 pub const INSIDE: u8 = 2;
 
-/// Most voxels of a run: voxels of a column of a layer whose centres are located one after the other, each from the
-/// owner of the one before.
-pub const VOXEL_RUN: u32 = 64;
-/// Most tetrahedra of a walk across faces before the tree is searched.
-pub const WALK: u32 = 6;
 /// Most voxels that are sliced at a time, unless a single row has more.
 pub const BAND_VOXELS: u64 = 1 << 20;
 /// Most voxels along an axis; numbers up to this are exact in single precision.

@@ -69,11 +69,6 @@ impl TreeArrays {
         if level == 0 { 0..end(0) } else { end(level - 1)..end(level) }
     }
 
-    /// The level of a node.
-    pub fn level_of(&self, node: u32) -> u32 {
-        self.no.partition_point(|&n| n <= node) as u32
-    }
-
     /// The children of a node, in the order of their Morton digits; empty for leaves.
     pub fn children(&self, node: u32) -> Range<u32> {
         match self.co.get(node as usize..node as usize + 2) {

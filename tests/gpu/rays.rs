@@ -117,7 +117,7 @@ fn what_pipelines_find_is_right() {
 #[test]
 fn meshes_without_cells_have_no_owners() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
-    for method in RayMethod::ALL.into_iter().filter(|&method| has_rays(&gpu, method)) {
+    for method in RayMethod::EVERY.into_iter().filter(|&method| has_rays(&gpu, method)) {
         for mesh in [Mesh::default(), Mesh::new(vec![[0.0; 3]; 4], vec![[0, 1, 1, 9]; 3])] {
             let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
             let (rays, owners, _) = by_rays(&gpu, &device, method, &[[0.0; 3], [0.5; 3]]);

@@ -18,7 +18,7 @@ use olbvh::gpu::{Arena, Binding, Buffer, BufferRef, Gpu, GpuOptions, Recorder};
 use olbvh::kernels::{DeviceClass, SortTarget, Target};
 use olbvh::mesh::{On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
-use olbvh::primitives::{Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs};
+use olbvh::primitives::{Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, NearestMemory, PointInput, PointOrder, Rounds, Scene, cmd_interpolate, cmd_locate,
     cmd_nearest, cmd_sort_points, cmd_visible, visible_bytes,
@@ -68,18 +68,10 @@ fn primitives() {
         let n = 50_000;
         let words = |n: u64| gpu.upload("olbvh.test.words", &vec![3u32; n as usize]).unwrap();
         let (a, b, total, count, sink) = (words(n), words(n), words(1), words(1), words(64));
-        let carve = |a: &mut Arena| {
-            Ok((ScanScratch::carve(&gpu, a, n as u32)?, SortScratch::carve(&gpu, a, n as u32, 21)?, a.take(REDUCE_SCRATCH)?))
-        };
-        let (_scratch, (scan, sort, reduce)) = Arena::reserve(&gpu, "olbvh.test.scratch", carve).unwrap();
+        let carve = |a: &mut Arena| Ok((ScanScratch::carve(&gpu, a, n as u32)?, SortScratch::carve(&gpu, a, n as u32, 21)?));
+        let (_scratch, (scan, sort)) = Arena::reserve(&gpu, "olbvh.test.scratch", carve).unwrap();
         for count in [Count::host(n as u32), Count::device(n as u32, count.all())] {
             let what = format!("{} {count:?}", gpu.target().name);
-            every_barrier_counts(&gpu, &format!("reduce {what}"), |r| {
-                cmd_reduce(r, Reduction::Add, a.all(), total.all(), count, reduce)?;
-                r.barrier("reduce → caller");
-                read(r, &[total.all()], &sink);
-                Ok(())
-            });
             every_barrier_counts(&gpu, &format!("scan {what}"), |r| {
                 r.fill(a.all(), 1);
                 cmd_exclusive_scan(r, a.all(), b.all(), total.all(), count, &scan)?;

@@ -1,6 +1,6 @@
 //! The construction: depth, capacities, and the rules of a tree.
 
-use super::{ALPHAS, options, prepared, tree};
+use super::{ALPHAS, level_of, options, prepared, tree};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, usual_capacity};
@@ -136,7 +136,7 @@ fn a_mesh_that_is_a_point_has_a_chain_of_single_nodes() {
     assert_eq!((tree.grid.level, tree.nodes()), (10, 11));
     for node in 0..11 {
         assert_eq!(tree.tets(node), [0, 1, 2]);
-        assert_eq!(tree.level_of(node), node);
+        assert_eq!(level_of(&tree, node), node);
     }
 }
 
@@ -163,11 +163,11 @@ fn levels_children_and_memory_agree() {
     let (mesh, topology) = prepared(kuhn([10; 3]).unwrap());
     let tree = tree(&mesh, &topology, 0.0, Assign::Aabb);
     for node in 0..tree.nodes() {
-        let level = tree.level_of(node);
+        let level = level_of(&tree, node);
         assert!(tree.level_nodes(level).contains(&node));
         let children: Vec<u32> = tree.children(node).collect();
         assert_eq!(children, (0..8).filter_map(|d| tree.child(node, d)).collect::<Vec<_>>());
-        assert!(children.iter().all(|&c| tree.level_of(c) == level + 1));
+        assert!(children.iter().all(|&c| level_of(&tree, c) == level + 1));
         let below: usize = children.iter().map(|&c| tree.tets(c).len()).sum();
         assert!(children.is_empty() || below == tree.tets(node).len());
     }

@@ -41,6 +41,11 @@ fn prepared(mesh: Mesh) -> (Mesh, Topology) {
     (mesh, topology)
 }
 
+/// The level of a node.
+fn level_of(tree: &TreeArrays, node: u32) -> u32 {
+    tree.no.partition_point(|&n| n <= node) as u32
+}
+
 /// Reproducible random numbers from 0 to 1.
 struct Random(u64);
 

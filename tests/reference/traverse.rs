@@ -1,6 +1,6 @@
 //! Traversal with a short stack visits the leaves that a recursion visits.
 
-use super::{prepared, tree};
+use super::{level_of, prepared, tree};
 use olbvh::grid::unmorton;
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::kuhn_jittered;
@@ -71,7 +71,7 @@ fn nodes_know_their_level_and_code() {
         &tree,
         2,
         |node| {
-            assert_eq!(tree.level_of(node.index), node.level);
+            assert_eq!(level_of(&tree, node.index), node.level);
             assert!(unmorton(node.code).iter().all(|k| k >> node.level == 0));
             true
         },

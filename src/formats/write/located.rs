@@ -12,7 +12,8 @@ use super::quiet::Quiet;
 use super::vtu::{Block, Column, Grid};
 use super::{NpyNumber, OutputFile, OutputFormat, write_file, write_json};
 use crate::error::{Error, Result};
-use crate::formats::array::{MOST_COMPONENTS, suffixes};
+use crate::formats::array::suffixes;
+use crate::formats::loss::MOST_COMPONENTS;
 use crate::formats::npy;
 use crate::mesh::Mesh;
 

@@ -2,7 +2,6 @@
 //! available.
 
 use super::frames::{Frames, each_once, unfinished};
-use super::sets::BUDGET;
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{OverlapPairs, OverlapPairsSpec};
@@ -138,6 +137,6 @@ fn cmd_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, fi
         capacity: capacity_of(found, 8),
     };
     let (each_once, stride, own_stride) = (each_once(b), mesh.stride, own.stride);
-    let spec = OverlapPairsSpec { workgroup, each_once, budget: BUDGET, own_stride, stride, fill, ..Default::default() };
+    let spec = OverlapPairsSpec { workgroup, each_once, own_stride, stride, fill, ..Default::default() };
     r.stage("overlap.pairs", |r| r.dispatch(&arguments, spec, Groups::Count(own.tets.div_ceil(workgroup))))
 }

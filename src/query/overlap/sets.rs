@@ -11,9 +11,6 @@ use crate::layout::SearchState;
 use crate::primitives::Count;
 use crate::query::{Rounds, Scene, list_parts};
 
-/// Nodes and entries that one tetrahedron may visit in one dispatch.
-pub(super) const BUDGET: u32 = 512;
-
 /// Arrays of one direction: the tetrahedra of one mesh against the tree of the other.
 #[derive(Clone, Copy, Debug)]
 struct Arrays {
@@ -228,7 +225,7 @@ impl Direction {
             most: own.tets,
         };
         let (each_once, stride, own_stride) = (each_once(&self.other), mesh.input.stride, own.stride);
-        let spec = OverlapSearchSpec { workgroup, each_once, budget: BUDGET, own_stride, stride, ..Default::default() };
+        let spec = OverlapSearchSpec { workgroup, each_once, own_stride, stride, ..Default::default() };
         r.dispatch(&arguments, spec, groups)
     }
 }

@@ -4,13 +4,13 @@
 use super::{SliceInput, SliceMemory, cmd_slice_in};
 use crate::build::Tree;
 use crate::error::Result;
-use crate::gpu::{Arena, Buffer, Gpu};
+use crate::gpu::{Arena, Buffer, Gpu, Recorder};
 use crate::grid::CellRange;
 use crate::layout::constants::voxels::SLICE_TOUCHED;
 use crate::layout::{Grid, RunState, SliceStatus};
 use crate::mesh::On;
 use crate::query::searched::Searched;
-use crate::query::{Progress, Rounds, upload_field};
+use crate::query::{Progress, until_done, upload_field};
 use crate::slicing::{BAND_VOXELS, Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOXEL_RUN, VoxelGrid, bands};
 use crate::times::StageTimes;
 
@@ -75,27 +75,21 @@ impl<'a> Slicing<'a> {
     /// # Errors
     /// As [`super::cmd_slice`], or a failed Vulkan call.
     pub(crate) fn band(&mut self, rows: Rows) -> Result<Band> {
-        let (memory, sliced) = (&self.memory, &mut self.sliced);
+        let (gpu, memory, sliced) = (self.gpu, &self.memory, &mut self.sliced);
         let field = self.field.as_ref().map(|(buffer, on)| (buffer.all(), *on));
         let input = SliceInput { voxels: self.voxels, rows, field, extrapolate: self.extrapolate };
-        let mut rounds = Rounds::begin(1);
-        let status = loop {
-            let ((), times) =
-                self.gpu.submit("olbvh.query.slice", |r| cmd_slice_in(r, &self.searched, &input, self.cells, memory, rounds))?;
-            rounds = Rounds::resume(1);
-            sliced.times.add(times);
-            let status: SliceStatus = self.gpu.download_one(&self.buffer, memory.status)?;
-            if status.locating + status.touching == 0 {
-                break status;
-            }
-        };
+        let record = |r: &mut Recorder<'_>, rounds| cmd_slice_in(r, &self.searched, &input, self.cells, memory, rounds);
+        let status = until_done(gpu, "olbvh.query.slice", 1, &mut sliced.times, record, || {
+            let status: SliceStatus = gpu.download_one(&self.buffer, memory.status)?;
+            Ok((status.locating + status.touching == 0).then_some(status))
+        })?;
         sliced.tally.inside += u64::from(status.inside);
         sliced.tally.touched += u64::from(status.touched);
         sliced.tally.empty += u64::from(status.empty);
         let words = 4 * u64::from(input.count());
-        let answers: Vec<u32> = self.gpu.download(&self.buffer, memory.answers.part(0, words))?;
+        let answers: Vec<u32> = gpu.download(&self.buffer, memory.answers.part(0, words))?;
         let values = match input.field {
-            Some(_) => self.gpu.download(&self.buffer, memory.values.part(0, words))?,
+            Some(_) => gpu.download(&self.buffer, memory.values.part(0, words))?,
             None => vec![f32::NAN; answers.len()],
         };
         let kind = |a: u32| match a {

@@ -9,7 +9,7 @@ use crate::grid::CellRange;
 use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::{Field, Mesh, On};
 use crate::query::searched::Searched;
-use crate::query::{Progress, Rounds, SILENT, upload_field};
+use crate::query::{Progress, Rounds, SILENT, until_done, upload_field};
 use crate::render::{PicturePlan, Prepared, RenderSettings, RenderStats, TABLE_SIZE, ValidTets};
 use crate::times::StageTimes;
 use bytemuck::Pod;
@@ -143,15 +143,12 @@ impl<'a> Canvas<'a> {
         times.add(gpu.submit("olbvh.query.intervals", begin)?.1);
         self.marked = true;
         let rays = u64::from(size[0]) * u64::from(size[1]);
-        let status = loop {
-            let round = |r: &mut Recorder<'_>| cmd_render_in(r, searched, &input, cells, marked, memory, Rounds::resume(1));
-            times.add(gpu.submit("olbvh.query.march", round)?.1);
+        let round = |r: &mut Recorder<'_>, _| cmd_render_in(r, searched, &input, cells, marked, memory, Rounds::resume(1));
+        let status = until_done(gpu, "olbvh.query.march", 1, times, round, || {
             let status: RenderStatus = gpu.download_one(&self.buffer, memory.status)?;
             report(rays.saturating_sub(u64::from(status.unfinished)), rays)?;
-            if status.unfinished == 0 {
-                break status;
-            }
-        };
+            Ok((status.unfinished == 0).then_some(status))
+        })?;
         stats.samples += wide(status.samples);
         stats.skipped_samples += wide(status.skipped);
         stats.found_samples += wide(status.found);

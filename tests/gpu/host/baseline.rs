@@ -30,7 +30,7 @@ impl Baseline {
             Ok((BinaryTree::carve(a, tets)?, LbvhScratch::carve(gpu, a, tets)?, output, a.words(1)?))
         };
         let (memory, (tree, scratch, output, unfinished)) = Arena::reserve(gpu, "olbvh.test.lbvh", carve).unwrap();
-        let rays = RayMethod::ALL.into_iter().filter_map(|method| Rays::build(gpu, &mesh, method).unwrap()).collect();
+        let rays = RayMethod::EVERY.into_iter().filter_map(|method| Rays::build(gpu, &mesh, method).unwrap()).collect();
         Self { output, unfinished, mesh, points, tree, scratch, rays, _memory: memory }
     }
 
