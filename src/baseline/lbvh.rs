@@ -2,8 +2,8 @@
 
 use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
-use crate::gpu::{Arena, Buffer, BufferRef, Gpu, Groups, Recorder};
-use crate::kernels::{DeviceClass, LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec};
+use crate::gpu::{Arena, Buffer, BufferRef, DeviceClass, Gpu, Groups, Recorder};
+use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec};
 use crate::layout::{Grid, LbvhNode};
 use crate::mesh::On;
 use crate::primitives::{Count, SortScratch, cmd_fill, cmd_sort_pairs};

@@ -5,8 +5,7 @@ use super::mesh_report::MeshReport;
 use super::scaling::{Scale, scales};
 use super::suite::{Settings, Suite};
 use crate::error::Result;
-use crate::gpu::Gpu;
-use crate::kernels::Target;
+use crate::gpu::{Gpu, Target};
 use serde::Serialize;
 
 /// The device of a run.

@@ -33,7 +33,7 @@
 //! and read and write P (8 n).
 
 use crate::build::{DeviceMesh, SHARE, Tree, filtered};
-use crate::kernels::Target;
+use crate::gpu::Target;
 use crate::options::Lists;
 use crate::tree::stored::id_mask;
 

@@ -4,7 +4,7 @@ use super::build::{BuildCase, Way};
 use super::meshes::{MeshRecipe, recipes};
 use super::primitive_cases::push;
 use super::{Case, Group, TargetKind, Work};
-use crate::kernels::DeviceClass;
+use crate::gpu::DeviceClass;
 use crate::options::{Assign, Lists};
 
 /// All values of α of the full group.

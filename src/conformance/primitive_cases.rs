@@ -3,7 +3,7 @@
 use super::data::Keys;
 use super::primitives::{Live, ScanCase, SortCase, TargetKind};
 use super::{Case, Group, Work};
-use crate::kernels::DeviceClass;
+use crate::gpu::DeviceClass;
 
 /// Lengths around subgroups, workgroups and tiles of every target, around powers of two, and primes.
 const LENGTHS: [u32; 40] = [

@@ -3,8 +3,7 @@
 use super::buffers::{FILL, Guarded};
 use super::data::Keys;
 use super::failure::{Verdict, compare};
-use crate::gpu::{Arena, Gpu};
-use crate::kernels::{DeviceClass, ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
+use crate::gpu::{Arena, DeviceClass, Gpu, ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
 use crate::named::named;
 use crate::primitives::{Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
 

@@ -26,6 +26,7 @@ mod recorder;
 mod requirements;
 mod submission;
 mod submit;
+mod target;
 
 pub use acceleration::AccelerationStructure;
 pub(crate) use acceleration::Triangles;
@@ -45,6 +46,8 @@ pub use recorder::Recorder;
 #[cfg(test)]
 pub(crate) use recorder::fold_groups;
 pub use requirements::{DeviceKind, DeviceReport, RayTracing, Requirements};
+pub(crate) use target::LONGEST_LOOP;
+pub use target::{DeviceClass, ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
 
 use crate::error::Error;
 use ash::vk;

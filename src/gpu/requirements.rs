@@ -1,6 +1,6 @@
 //! Requirements on a physical device, checked before a logical device is created.
 
-use crate::kernels::WorkgroupLimits;
+use crate::gpu::WorkgroupLimits;
 use crate::named::named;
 use ash::vk;
 use std::ffi::{CStr, c_char};

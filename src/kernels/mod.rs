@@ -1,12 +1,6 @@
-//! The kernels' Rust side, generated from `glsl/` by `build.rs`, and their tuning per device.
+//! The kernels' Rust side, generated from `glsl/` by `build.rs`.
 
 use crate::gpu::{Access, Arguments, BufferInfo, BufferRef, Kernel, KernelInfo, Specialization};
-
-mod rows;
-mod target;
-pub use rows::DeviceClass;
-pub(crate) use target::LONGEST_LOOP;
-pub use target::{ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
 
 fn put(out: &mut [u8], at: usize, bytes: &[u8]) {
     out[at..at + bytes.len()].copy_from_slice(bytes);

@@ -2,8 +2,8 @@
 
 use super::Count;
 use crate::error::Result;
-use crate::gpu::{Arena, BufferRef, Gpu, Groups, Recorder};
-use crate::kernels::{LONGEST_LOOP, ScanApply, ScanApplySpec, ScanSpine, ScanSpineSpec, ScanTiles, ScanTilesSpec};
+use crate::gpu::{Arena, BufferRef, Gpu, Groups, LONGEST_LOOP, Recorder};
+use crate::kernels::{ScanApply, ScanApplySpec, ScanSpine, ScanSpineSpec, ScanTiles, ScanTilesSpec};
 
 /// Scratch memory of a scan.
 #[derive(Clone, Copy, Debug)]

@@ -2,8 +2,8 @@
 
 use super::{Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
 use crate::error::{Error, Result};
-use crate::gpu::{Arena, Gpu, Groups};
-use crate::kernels::{LONGEST_LOOP, SelfTest, SelfTestSpec};
+use crate::gpu::{Arena, Gpu, Groups, LONGEST_LOOP};
+use crate::kernels::{SelfTest, SelfTestSpec};
 use std::fmt::Debug;
 
 /// Pairs to sort and values to scan: several tiles, the last one partial.

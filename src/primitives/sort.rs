@@ -2,10 +2,10 @@
 
 use super::{Count, ScanScratch, cmd_exclusive_scan};
 use crate::error::{Error, Result};
-use crate::gpu::{ALIGNMENT, Arena, BufferRef, Gpu, Groups, Recorder};
+use crate::gpu::{ALIGNMENT, Arena, BufferRef, Gpu, Groups, Recorder, SortTarget};
 use crate::kernels::{
     SortDigitsBallot, SortDigitsBallotSpec, SortHistogramSerial, SortHistogramSerialSpec, SortPlan, SortPlanSpec, SortScatterBallot,
-    SortScatterBallotSpec, SortScatterSerial, SortScatterSerialSpec, SortSplitPairs, SortSplitPairsSpec, SortTarget,
+    SortScatterBallotSpec, SortScatterSerial, SortScatterSerialSpec, SortSplitPairs, SortSplitPairsSpec,
 };
 
 /// Scratch memory of a sort.
@@ -262,7 +262,7 @@ impl PairSort<'_> {
 mod tests {
     use super::*;
     use crate::gpu::GpuOptions;
-    use crate::kernels::{DeviceClass, WorkgroupLimits};
+    use crate::gpu::{DeviceClass, WorkgroupLimits};
 
     /// Tiles that begin in reverse order wait for what no workgroup has counted yet, more of them than a device runs at a
     /// time, and must count it themselves.

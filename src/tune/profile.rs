@@ -2,8 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::formats::OutputFile;
-use crate::gpu::DeviceReport;
-use crate::kernels::Target;
+use crate::gpu::{DeviceReport, Target};
 use etcetera::BaseStrategy as _;
 use serde::{Deserialize, Serialize};
 use std::io::Write as _;

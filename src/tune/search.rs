@@ -4,7 +4,7 @@ use super::profile::Gain;
 use super::tunables::{TUNABLES, other_sort};
 use crate::bench::Spread;
 use crate::error::{Error, Result};
-use crate::kernels::{Target, WorkgroupLimits};
+use crate::gpu::{Target, WorkgroupLimits};
 use crate::times::StageTime;
 use std::time::{Duration, Instant};
 
@@ -232,7 +232,7 @@ fn gains(work: &dyn Work, start: &Target, best: &Target) -> Result<Vec<Gain>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernels::DeviceClass;
+    use crate::gpu::DeviceClass;
     use std::cell::{Cell, RefCell};
 
     /// A fake device that is fastest with queries of 64 and runs of 256, computes wrong results with spines of 128, and

@@ -1,6 +1,6 @@
 //! The parameters that can be changed.
 
-use crate::kernels::{DeviceClass, Target, WorkgroupLimits};
+use crate::gpu::{DeviceClass, Target, WorkgroupLimits};
 
 /// One parameter of a [`Target`].
 pub struct Tunable {

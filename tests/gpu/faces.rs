@@ -1,8 +1,7 @@
 //! Stage 0 on meshes whose faces crowd in the hash table of faces, or have more than two cells, by both kernels of faces.
 
 use olbvh::build::{BadCells, DeviceMesh};
-use olbvh::gpu::{Gpu, GpuOptions};
-use olbvh::kernels::DeviceClass;
+use olbvh::gpu::{DeviceClass, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn};
 use olbvh::reference::boundary::topology;
 use std::collections::{BTreeMap, BTreeSet};

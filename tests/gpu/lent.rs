@@ -13,9 +13,8 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{
-    Binding, DescriptorPools, DescriptorRoom, EnabledFeatures, Gpu, GpuOptions, HostDevice, HostQueue, Recorder, Requirements,
+    Binding, DescriptorPools, DescriptorRoom, EnabledFeatures, Gpu, GpuOptions, HostDevice, HostQueue, Recorder, Requirements, Target,
 };
-use olbvh::kernels::Target;
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, SILENT, locate};

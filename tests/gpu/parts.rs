@@ -3,8 +3,7 @@
 use crate::submit::submit;
 use olbvh::build::{BadCells, DeviceMesh, Tree, cmd_ranges, range_bytes};
 use olbvh::error::{Error, Result};
-use olbvh::gpu::{Arena, BufferRef, Gpu, GpuOptions, Recorder};
-use olbvh::kernels::DeviceClass;
+use olbvh::gpu::{Arena, BufferRef, DeviceClass, Gpu, GpuOptions, Recorder};
 use olbvh::layout::ViewUniforms;
 use olbvh::mesh::{On, kuhn};
 use olbvh::options::{BuildOptions, Lists};

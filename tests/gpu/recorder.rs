@@ -14,8 +14,7 @@ use olbvh::build::{
     BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshScratch, MeshView, Tree, TreeMemory, cmd_build, cmd_prepare_mesh,
     cmd_ranges, range_bytes,
 };
-use olbvh::gpu::{Arena, Binding, Buffer, BufferRef, Gpu, GpuOptions, Recorder};
-use olbvh::kernels::{DeviceClass, SortTarget, Target};
+use olbvh::gpu::{Arena, Binding, Buffer, BufferRef, DeviceClass, Gpu, GpuOptions, Recorder, SortTarget, Target};
 use olbvh::mesh::{On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::primitives::{Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};

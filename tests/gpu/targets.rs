@@ -4,8 +4,7 @@
 use olbvh::baseline::Lbvh;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Error;
-use olbvh::gpu::{Gpu, GpuOptions};
-use olbvh::kernels::{DeviceClass, Target};
+use olbvh::gpu::{DeviceClass, Gpu, GpuOptions, Target};
 use olbvh::mesh::{Bounds, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{self, LocateMethod, LocateOptions, SILENT};

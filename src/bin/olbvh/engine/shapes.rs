@@ -2,8 +2,7 @@
 
 use crate::arguments::named;
 use crate::common::{Common, Failure, Outcome};
-use olbvh::gpu::DeviceReport;
-use olbvh::kernels::{DeviceClass, Target};
+use olbvh::gpu::{DeviceClass, DeviceReport, Target};
 use olbvh::tune::{Profile, Search, folder};
 use std::path::{Path, PathBuf};
 

@@ -6,7 +6,7 @@
 //! Workgroup sizes of the other kernels follow from the resources of a core: small where registers are few or subgroups
 //! narrow. `olbvh tune` finds better parameters for the device at hand.
 
-use super::target::{ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
+use super::{ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
 use crate::gpu::{DeviceKind, DeviceReport};
 use crate::named::named;
 use ash::vk::DriverId;

@@ -1,5 +1,9 @@
 //! Targets: the tuning parameters of the kernels that can be chosen per device, and their limits. The choices are in a
-//! table, see [`super::DeviceClass`].
+//! table, see [`DeviceClass`].
+
+mod rows;
+
+pub use rows::DeviceClass;
 
 use crate::error::{Error, Result};
 use std::borrow::Cow;
