@@ -5,6 +5,13 @@
  * handle at the same time, except a recording, which only one thread may use at a time. Structs and arrays that are
  * passed to a function are read during the call and need not live longer.
  *
+ * Pointers: each points to as many elements as its function states, valid during the call and aligned for their type, or
+ * is null where the function says so. What a function writes overlaps no other argument, and nothing else uses it
+ * meanwhile. Handles are those that this library returned; no handle is used after it was freed, or freed during a call
+ * that uses it. Strings end with a zero byte. A call with a misaligned pointer, or with null where that is not allowed,
+ * returns OLBVH_STATUS_INVALID; whatever else contradicts this is undefined behaviour. After an error, places of
+ * handles and structs are as they were before the call; arrays may have been written in part.
+ *
  * Recording: functions olbvh_cmd_... append commands to a command buffer of the host, which may belong to any queue
  * family with compute and must not be inside a render pass. They do not submit, wait, allocate or read back anything.
  * - Memory: sizes are known first. olbvh_plan_measure measures a plan; for every query a function olbvh_..._parts

@@ -1,8 +1,8 @@
 //! The C interface to the overlap of two meshes: which tetrahedra intersect the other mesh, and which pairs intersect.
 
-use super::scene::{OlbvhScene, scene_on};
-use super::{OlbvhBuffer, OlbvhRecording, OlbvhRounds, recorded};
-use crate::capi::{OlbvhStatus, border, handle, put};
+use super::scene::{OlbvhScene, begun_with};
+use super::{OlbvhBuffer, OlbvhRecording, OlbvhRounds};
+use crate::capi::{OlbvhStatus, border, handle, place};
 use crate::query::{OverlapMemory, PairMemory, cmd_count_pairs, cmd_list_pairs, cmd_overlap};
 
 /// Memory for the overlap of two meshes, and where in it the results are.
@@ -31,31 +31,35 @@ pub struct OlbvhPairParts {
 /// Reports how much memory the overlap of two meshes needs, and where in `memory` (size 0 if it does not exist yet) the
 /// results are.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_overlap_parts(
+pub unsafe extern "C" fn olbvh_overlap_parts(
     a: *const OlbvhScene,
     b: *const OlbvhScene,
     memory: OlbvhBuffer,
     out: *mut OlbvhOverlapParts,
 ) -> OlbvhStatus {
     border(|| {
-        let (a, b) = (&handle(a, "a")?.scene, &handle(b, "b")?.scene);
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (a, b, out) = unsafe { (&handle(a, "a")?.scene, &handle(b, "b")?.scene, place(out)?) };
         let (bytes, OverlapMemory { hits, status, .. }) = memory.carve(|arena| OverlapMemory::carve(arena, a, b))?;
-        put(out, OlbvhOverlapParts { bytes, hits: hits.map(OlbvhBuffer::from), status: status.map(OlbvhBuffer::from) })
+        out.write(OlbvhOverlapParts { bytes, hits: hits.map(OlbvhBuffer::from), status: status.map(OlbvhBuffer::from) });
+        Ok(())
     })
 }
 
 /// Records the search for the tetrahedra of A that intersect B, and of B that intersect A. The points of both meshes
 /// are in the same coordinate system. Three rounds are enough for most meshes.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_overlap(
+pub unsafe extern "C" fn olbvh_cmd_overlap(
     recording: *mut OlbvhRecording,
     a: *const OlbvhScene,
     b: *const OlbvhScene,
     memory: OlbvhBuffer,
     rounds: OlbvhRounds,
 ) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (a, b) = (&scene_on(r, a, "a")?.scene, &scene_on(r, b, "b")?.scene);
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { scene: a, .. }), b) = unsafe { (begun_with(recording, a, "a")?, handle(b, "b")?) };
+        let b = b.on_device_of(r, "b")?;
         let memory = memory.place(|arena| OverlapMemory::carve(arena, a, b))?;
         cmd_overlap(r, a, b, &memory, rounds.into())
     })
@@ -64,26 +68,30 @@ pub extern "C" fn olbvh_cmd_overlap(
 /// Reports how much memory the pairs of A with another mesh need, and where in `memory` (size 0 if it does not exist
 /// yet) the status is.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_pair_parts(a: *const OlbvhScene, memory: OlbvhBuffer, out: *mut OlbvhPairParts) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_pair_parts(a: *const OlbvhScene, memory: OlbvhBuffer, out: *mut OlbvhPairParts) -> OlbvhStatus {
     border(|| {
-        let a = handle(a, "a")?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (a, out) = unsafe { (handle(a, "a")?, place(out)?) };
         let (bytes, PairMemory { status, .. }) = memory.carve(|arena| PairMemory::carve(&a.gpu, arena, a.scene.mesh.input.tets))?;
-        put(out, OlbvhPairParts { bytes, status: status.into() })
+        out.write(OlbvhPairParts { bytes, status: status.into() });
+        Ok(())
     })
 }
 
 /// Records the counting of the pairs of a tetrahedron of A and one of B that touch. The tree over B must have full
 /// lists (`lists` 0). Unless its `assign` is 0, a pair is counted once for every leaf that lists both.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_count_pairs(
+pub unsafe extern "C" fn olbvh_cmd_count_pairs(
     recording: *mut OlbvhRecording,
     a: *const OlbvhScene,
     b: *const OlbvhScene,
     memory: OlbvhBuffer,
     rounds: OlbvhRounds,
 ) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (OlbvhScene { gpu, scene: a, .. }, b) = (scene_on(r, a, "a")?, &scene_on(r, b, "b")?.scene);
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { gpu, scene: a, .. }), b) = unsafe { (begun_with(recording, a, "a")?, handle(b, "b")?) };
+        let b = b.on_device_of(r, "b")?;
         let memory = memory.place(|arena| PairMemory::carve(gpu, arena, a.mesh.input.tets))?;
         cmd_count_pairs(r, a, b, &memory, rounds.into())
     })
@@ -93,7 +101,7 @@ pub extern "C" fn olbvh_cmd_count_pairs(
 /// that of B, ascending by A. Only as many as fit `found` are written. Starts with a barrier; if it continues where an
 /// earlier recording ended, it starts with a transfer write of the status.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_list_pairs(
+pub unsafe extern "C" fn olbvh_cmd_list_pairs(
     recording: *mut OlbvhRecording,
     a: *const OlbvhScene,
     b: *const OlbvhScene,
@@ -101,8 +109,10 @@ pub extern "C" fn olbvh_cmd_list_pairs(
     found: OlbvhBuffer,
     rounds: OlbvhRounds,
 ) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (OlbvhScene { gpu, scene: a, .. }, b) = (scene_on(r, a, "a")?, &scene_on(r, b, "b")?.scene);
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { gpu, scene: a, .. }), b) = unsafe { (begun_with(recording, a, "a")?, handle(b, "b")?) };
+        let b = b.on_device_of(r, "b")?;
         let memory = memory.place(|arena| PairMemory::carve(gpu, arena, a.mesh.input.tets))?;
         cmd_list_pairs(r, a, b, &memory, found.part(), rounds.into())
     })

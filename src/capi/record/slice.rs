@@ -1,9 +1,9 @@
 //! The C interface to slices.
 
-use super::scene::{OlbvhScene, scene_on};
-use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
+use super::scene::{OlbvhScene, begun_with};
+use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds};
 use crate::capi::query::OlbvhVoxels;
-use crate::capi::{OlbvhStatus, border, handle, put};
+use crate::capi::{OlbvhStatus, border, handle, place};
 use crate::query::{SliceInput, SliceMemory, cmd_slice};
 use crate::slicing::{Extrapolate, Rows};
 
@@ -50,21 +50,28 @@ pub struct OlbvhSlicingParts {
 
 /// Reports how much memory a slice needs, and where in its `memory` (size 0 if it does not exist yet) the results are.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_slicing_parts(slicing: *const OlbvhSlicing, out: *mut OlbvhSlicingParts) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_slicing_parts(slicing: *const OlbvhSlicing, out: *mut OlbvhSlicingParts) -> OlbvhStatus {
     border(|| {
-        let slicing = handle(slicing, "slicing")?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (slicing, out) = unsafe { (handle(slicing, "slicing")?, place(out)?) };
         let (bytes, memory) =
             slicing.memory.carve(|a| SliceMemory::carve(a, [slicing.voxels.width, slicing.voxels.height], slicing.rows))?;
         let SliceMemory { answers, values, status, .. } = memory;
-        put(out, OlbvhSlicingParts { bytes, answers: answers.into(), values: values.into(), status: status.into() })
+        out.write(OlbvhSlicingParts { bytes, answers: answers.into(), values: values.into(), status: status.into() });
+        Ok(())
     })
 }
 
 /// Records the slicing of rows of voxels. Transfers write the status as well.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_slice(recording: *mut OlbvhRecording, scene: *const OlbvhScene, slicing: *const OlbvhSlicing) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (scene, slicing) = (&scene_on(r, scene, "scene")?.scene, handle(slicing, "slicing")?);
+pub unsafe extern "C" fn olbvh_cmd_slice(
+    recording: *mut OlbvhRecording,
+    scene: *const OlbvhScene,
+    slicing: *const OlbvhSlicing,
+) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { scene, .. }), slicing) = unsafe { (begun_with(recording, scene, "scene")?, handle(slicing, "slicing")?) };
         let OlbvhSlicing { layer, first, rows, field, .. } = *slicing;
         let field = (field.values.size > 0).then(|| field.read());
         let extrapolate = if slicing.linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
