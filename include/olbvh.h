@@ -619,8 +619,7 @@ typedef struct olbvh_nearest_parts_data {
    */
   uint64_t bytes;
   /*
-   Four words per point. The third is the tetrahedron with the closest place, or `UINT32_MAX`; the fourth, a float, is
-   the squared distance times (scale · 2^19)², with the scale of the mesh's grid.
+   An `olbvh_near_state` per point.
    */
   struct olbvh_buffer states;
   /*
@@ -758,8 +757,7 @@ typedef struct olbvh_picture_parts_data {
    */
   struct olbvh_buffer colors;
   /*
-   A word for the kernels. Then three numbers of two words each, lower word first: samples taken, samples in the mesh,
-   samples skipped. Then a word: rays that need another round.
+   An `olbvh_picture_status`.
    */
   struct olbvh_buffer status;
 } olbvh_picture_parts_data;
@@ -821,10 +819,7 @@ typedef struct olbvh_slicing_parts_data {
    */
   struct olbvh_buffer values;
   /*
-   Words, counted from 0. Words 0 and 1: runs of voxels, and voxels, that need another round; nothing else may be
-   used until both are 0. Word 2: why all voxels are empty (1: the boxes are flat, 2: they are larger than two to
-   four times the mesh), or 0. Words 3 to 5: voxels whose centre lies in the mesh, voxels that the mesh merely
-   touches, voxels that it does not touch.
+   An `olbvh_slice_status`.
    */
   struct olbvh_buffer status;
 } olbvh_slicing_parts_data;
@@ -842,7 +837,7 @@ typedef struct olbvh_overlap_parts_data {
    */
   struct olbvh_buffer hits[2];
   /*
-   For A and for B: the fifth word counts the tetrahedra that need another round; their bits are 0 until then.
+   For A and for B: an `olbvh_overlap_status`. The bits of unfinished tetrahedra are 0.
    */
   struct olbvh_buffer status[2];
 } olbvh_overlap_parts_data;
@@ -856,8 +851,7 @@ typedef struct olbvh_pair_parts_data {
    */
   uint64_t bytes;
   /*
-   Words, counted from 0. Word 4: tetrahedra of A that need another round of counting. Word 5: tetrahedra of A that
-   need another round for their pairs to be written. Words 8 and 9: number of pairs, lower word first.
+   An `olbvh_overlap_status` for A.
    */
   struct olbvh_buffer status;
 } olbvh_pair_parts_data;
@@ -966,6 +960,138 @@ typedef struct olbvh_mesh_status {
    */
   uint32_t branched;
 } olbvh_mesh_status;
+
+/*
+ State of the search for the place of the surface that is closest to a point, which the device writes to
+ `olbvh_nearest_parts_data.states`.
+ */
+typedef struct olbvh_near_state {
+  /*
+   Where the search goes on in another round; `UINT32_MAX`: it has ended.
+   */
+  uint32_t code;
+  /*
+   How much of the leaf there is done.
+   */
+  uint32_t entry;
+  /*
+   The tetrahedron with the closest place, or `UINT32_MAX`.
+   */
+  uint32_t owner;
+  /*
+   Squared distance times (s · 2^19)², infinite without a place. s is the power of two that brings the largest extent
+   of the mesh into [1, 2): `scale` of `olbvh_Grid` in olbvh.glsl, the first of `olbvh_scene_arrays_data.bindings`.
+   */
+  float square;
+} olbvh_near_state;
+
+/*
+ Progress of a picture, which the device writes to `olbvh_picture_parts_data.status`. Numbers of two words have the
+ lower one first.
+ */
+typedef struct olbvh_picture_status {
+  /*
+   Number of rays that may meet the mesh, and of some beside them.
+   */
+  uint32_t met;
+  /*
+   Number of samples taken.
+   */
+  uint32_t samples[2];
+  /*
+   Number of samples in the mesh.
+   */
+  uint32_t found[2];
+  /*
+   Number of samples skipped, in nodes without visible values.
+   */
+  uint32_t skipped[2];
+  /*
+   Number of rays that need another round.
+   */
+  uint32_t unfinished;
+} olbvh_picture_status;
+
+/*
+ Progress and result of a slice, which the device writes to `olbvh_slicing_parts_data.status`. No result may be used,
+ and the numbers of voxels say nothing, until `locating` and `touching` are 0.
+ */
+typedef struct olbvh_slice_status {
+  /*
+   Number of runs of voxels that need another round for their centres.
+   */
+  uint32_t locating;
+  /*
+   Number of voxels that need another round for their boxes.
+   */
+  uint32_t touching;
+  /*
+   Why all voxels are empty: 1 if the boxes are flat, 2 if they are larger than two to four times the mesh. 0
+   otherwise.
+   */
+  uint32_t refused;
+  /*
+   Number of voxels whose centre lies in the mesh.
+   */
+  uint32_t inside;
+  /*
+   Number of voxels that the mesh merely touches.
+   */
+  uint32_t touched;
+  /*
+   Number of voxels that the mesh does not touch.
+   */
+  uint32_t empty;
+} olbvh_slice_status;
+
+/*
+ Progress of the search for the tetrahedra of one mesh that intersect another, or for the pairs of A, which the device
+ writes to `status` of `olbvh_overlap_parts_data` or `olbvh_pair_parts_data`. Numbers of two words have the lower one
+ first.
+ */
+typedef struct olbvh_overlap_status {
+  /*
+   Number of tetrahedra that are searched for in the other tree, since no vertex decides. This number and the next
+   three are 0 for pairs.
+   */
+  uint32_t waiting;
+  /*
+   Number of tetrahedra with a vertex in the other mesh, or that contain one of its vertices.
+   */
+  uint32_t by_vertex;
+  /*
+   Number of tetrahedra that touch a node inside of the other mesh.
+   */
+  uint32_t by_node;
+  /*
+   Number of vertices that had to be located in the list of a leaf.
+   */
+  uint32_t located;
+  /*
+   Number of tetrahedra that need another round of `olbvh_cmd_overlap` or `olbvh_cmd_count_pairs`.
+   */
+  uint32_t unfinished;
+  /*
+   Number of tetrahedra that need another round of `olbvh_cmd_list_pairs`, which does nothing before `unfinished` is 0.
+   */
+  uint32_t unfilled;
+  /*
+   Number of tests of two tetrahedra.
+   */
+  uint32_t narrow[2];
+  /*
+   Number of pairs, whether or not there was room for them. From 2^32 on, none is written.
+   */
+  uint32_t pairs[2];
+  /*
+   Not 0: nothing intersects, since a mesh has no valid tetrahedron, or a tree does not fit its capacity.
+   */
+  uint32_t empty;
+  /*
+   Unused.
+   */
+  uint32_t pad;
+} olbvh_overlap_status;
 
 #ifdef __cplusplus
 extern "C" {

@@ -3,6 +3,7 @@
 use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, array_mut, border, handle, text, tolerance};
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
+use crate::layout::constants::voxels::SLICE_TOUCHED;
 use crate::mesh::{Bounds, Field, Mesh, On};
 use crate::query::{LocateOptions, SILENT, locate, nearest, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
@@ -326,7 +327,7 @@ pub unsafe extern "C" fn olbvh_slice(
         let (mut answers, mut results) = (answers.iter_mut(), results.iter_mut());
         let extrapolate = if linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
         let mut sink = |band: Band| {
-            let touched = |kind: u8| if kind == TOUCHED { 1 << 31 } else { 0 };
+            let touched = |kind: u8| if kind == TOUCHED { SLICE_TOUCHED } else { 0 };
             let owners = band.owners.iter().zip(&band.kinds).map(|(&owner, &kind)| mesh.cell(owner) | touched(kind));
             fill(&mut answers, owners);
             fill(&mut results, band.values);

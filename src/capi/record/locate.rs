@@ -69,14 +69,30 @@ pub struct OlbvhOwnerParts {
 pub struct OlbvhNearestParts {
     /// Size of the memory in bytes.
     pub bytes: u64,
-    /// Four words per point. The third is the tetrahedron with the closest place, or `UINT32_MAX`; the fourth, a float, is
-    /// the squared distance times (scale · 2^19)², with the scale of the mesh's grid.
+    /// An `olbvh_near_state` per point.
     pub states: OlbvhBuffer,
     /// Four floats per point: barycentric coordinates of the place, in the order of the tetrahedron's vertices; zeroes if
     /// there is none.
     pub barycentrics: OlbvhBuffer,
     /// A word: the number of points that need another round.
     pub unfinished: OlbvhBuffer,
+}
+
+/// State of the search for the place of the surface that is closest to a point, which the device writes to
+/// `olbvh_nearest_parts_data.states`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "the device writes it, and C programs read it")]
+pub struct OlbvhNearState {
+    /// Where the search goes on in another round; `UINT32_MAX`: it has ended.
+    pub code: u32,
+    /// How much of the leaf there is done.
+    pub entry: u32,
+    /// The tetrahedron with the closest place, or `UINT32_MAX`.
+    pub owner: u32,
+    /// Squared distance times (s · 2^19)², infinite without a place. s is the power of two that brings the largest extent
+    /// of the mesh into [1, 2): `scale` of `olbvh_Grid` in olbvh.glsl, the first of `olbvh_scene_arrays_data.bindings`.
+    pub square: f32,
 }
 
 impl OlbvhLocation {

@@ -13,7 +13,7 @@ pub struct OlbvhOverlapParts {
     pub bytes: u64,
     /// For A and for B: one bit per tetrahedron, lowest bit of a word first, set if it intersects the other mesh.
     pub hits: [OlbvhBuffer; 2],
-    /// For A and for B: the fifth word counts the tetrahedra that need another round; their bits are 0 until then.
+    /// For A and for B: an `olbvh_overlap_status`. The bits of unfinished tetrahedra are 0.
     pub status: [OlbvhBuffer; 2],
 }
 
@@ -23,9 +23,38 @@ pub struct OlbvhOverlapParts {
 pub struct OlbvhPairParts {
     /// Size of the memory in bytes.
     pub bytes: u64,
-    /// Words, counted from 0. Word 4: tetrahedra of A that need another round of counting. Word 5: tetrahedra of A that
-    /// need another round for their pairs to be written. Words 8 and 9: number of pairs, lower word first.
+    /// An `olbvh_overlap_status` for A.
     pub status: OlbvhBuffer,
+}
+
+/// Progress of the search for the tetrahedra of one mesh that intersect another, or for the pairs of A, which the device
+/// writes to `status` of `olbvh_overlap_parts_data` or `olbvh_pair_parts_data`. Numbers of two words have the lower one
+/// first.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "the device writes it, and C programs read it")]
+pub struct OlbvhOverlapStatus {
+    /// Number of tetrahedra that are searched for in the other tree, since no vertex decides. This number and the next
+    /// three are 0 for pairs.
+    pub waiting: u32,
+    /// Number of tetrahedra with a vertex in the other mesh, or that contain one of its vertices.
+    pub by_vertex: u32,
+    /// Number of tetrahedra that touch a node inside of the other mesh.
+    pub by_node: u32,
+    /// Number of vertices that had to be located in the list of a leaf.
+    pub located: u32,
+    /// Number of tetrahedra that need another round of `olbvh_cmd_overlap` or `olbvh_cmd_count_pairs`.
+    pub unfinished: u32,
+    /// Number of tetrahedra that need another round of `olbvh_cmd_list_pairs`, which does nothing before `unfinished` is 0.
+    pub unfilled: u32,
+    /// Number of tests of two tetrahedra.
+    pub narrow: [u32; 2],
+    /// Number of pairs, whether or not there was room for them. From 2^32 on, none is written.
+    pub pairs: [u32; 2],
+    /// Not 0: nothing intersects, since a mesh has no valid tetrahedron, or a tree does not fit its capacity.
+    pub empty: u32,
+    /// Unused.
+    pub pad: u32,
 }
 
 /// Reports how much memory the overlap of two meshes needs, and where in `memory` (size 0 if it does not exist yet) the

@@ -76,9 +76,26 @@ pub struct OlbvhPictureParts {
     pub bytes: u64,
     /// Four floats per pixel, upper row first: colour multiplied by its opacity, and opacity.
     pub colors: OlbvhBuffer,
-    /// A word for the kernels. Then three numbers of two words each, lower word first: samples taken, samples in the mesh,
-    /// samples skipped. Then a word: rays that need another round.
+    /// An `olbvh_picture_status`.
     pub status: OlbvhBuffer,
+}
+
+/// Progress of a picture, which the device writes to `olbvh_picture_parts_data.status`. Numbers of two words have the
+/// lower one first.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "the device writes it, and C programs read it")]
+pub struct OlbvhPictureStatus {
+    /// Number of rays that may meet the mesh, and of some beside them.
+    pub met: u32,
+    /// Number of samples taken.
+    pub samples: [u32; 2],
+    /// Number of samples in the mesh.
+    pub found: [u32; 2],
+    /// Number of samples skipped, in nodes without visible values.
+    pub skipped: [u32; 2],
+    /// Number of rays that need another round.
+    pub unfinished: u32,
 }
 
 impl OlbvhPicture {

@@ -4,7 +4,7 @@ use super::queries::{Stage, place, plan, read};
 use super::*;
 use crate::build::{Capacity, TreeMemory};
 use crate::gpu::Arena;
-use crate::layout::{BuildStatus, MeshStatus};
+use crate::layout::{BuildStatus, MeshStatus, NearState, OverlapStatus, RenderStatus, SliceStatus};
 use crate::mesh::kuhn;
 use crate::reference::build::build as build_tree;
 use std::mem::offset_of;
@@ -137,6 +137,10 @@ fn statuses_have_the_layout_of_the_device() {
     same!(OlbvhMeshStatus, MeshStatus: lo hi bad boundary zero_volume negative crowded overflow branched);
     same!(OlbvhBuildStatus, BuildStatus: level wanted_level candidates entries nodes internal leaves boundary_leaves longest_leaf
         large_levels sum total levels overflow);
+    same!(OlbvhNearState, NearState: code entry owner square);
+    same!(OlbvhPictureStatus, RenderStatus: met samples found skipped unfinished);
+    same!(OlbvhSliceStatus, SliceStatus: locating touching refused inside touched empty);
+    same!(OlbvhOverlapStatus, OverlapStatus: waiting by_vertex by_node located unfinished unfilled narrow pairs empty pad);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::pictures::pictures;
 use super::*;
 use crate::capi::query::*;
 use crate::gpu::Buffer;
-use crate::layout::{NearState, ViewUniforms};
+use crate::layout::{NearState, OverlapStatus, RenderStatus, SliceStatus, ViewUniforms, wide};
 use crate::mesh::{Bounds, Field};
 use crate::options::TOLERANCE;
 use crate::query::{LocateOptions, Nearest, SILENT, locate, locate_all, nearest, overlap, render, slice};
@@ -284,14 +284,14 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     assert!(read::<[f32; 4]>(device, picture_parts.colors, 37 * 30) == expected.colors);
     let opaque = expected.colors.iter().map(|color| color[3] >= plan.termination);
     assert!(read::<f32>(device, depths.all().into(), 37 * 30).into_iter().map(|depth| depth > 0.0).eq(opaque));
-    let [_, samples, _, found_samples, _, skipped, _, unfinished] = read::<u32>(device, picture_parts.status, 8)[..] else {
-        unreachable!()
-    };
-    assert!(unfinished == 0 && samples >= found_samples && found_samples > 500 && skipped > 100, "{samples} {found_samples} {skipped}");
+    let drawn = read::<RenderStatus>(device, picture_parts.status, 1)[0];
+    let [samples, found_samples, skipped] = [drawn.samples, drawn.found, drawn.skipped].map(wide);
+    assert!(drawn.unfinished == 0 && samples >= found_samples && found_samples > 500 && skipped > 100, "{drawn:?}");
     assert_eq!(read::<u32>(device, slicing_parts.answers, 17 * 13 * 6), expected.answers);
     assert_eq!(read::<u32>(device, slicing_parts.values, 17 * 13 * 6), expected.sliced);
-    let [0, 0, 0, inside, touched, empty] = read::<u32>(device, slicing_parts.status, 6)[..] else { panic!("voxels are left") };
-    assert!(inside > 100 && touched > 100 && empty > 100, "{inside} {touched} {empty}");
+    let voxels = read::<SliceStatus>(device, slicing_parts.status, 1)[0];
+    assert_eq!([voxels.locating, voxels.touching, voxels.refused], [0; 3], "voxels are left");
+    assert!(voxels.inside > 100 && voxels.touched > 100 && voxels.empty > 100, "{voxels:?}");
     assert!(read::<f32>(device, interpolated.all().into(), count as usize) == expected.located);
     let firsts: Vec<u32> = expected.owners.iter().map(|list| list[0]).collect();
     assert_eq!((read(device, location.owners, firsts.len()), read(device, owner_parts.owners, firsts.len())), (firsts.clone(), firsts));
@@ -304,9 +304,11 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     assert_eq!(read::<u32>(device, near_parts.unfinished, 1), [0]);
     let hits = [0, 1].map(|i| read::<u32>(device, overlap_parts.hits[i], expected.hits[i].len()));
     assert!(hits == expected.hits && hits.iter().all(|words| words.iter().any(|&w| w != 0)));
-    let status: Vec<u32> = read(device, pair_parts.status, 10);
-    assert_eq!(status[4..6], [0; 2]);
-    assert_eq!(status[8..], [expected.pairs.len() as u32, 0]);
+    for part in overlap_parts.status {
+        assert_eq!(read::<OverlapStatus>(device, part, 1)[0].unfinished, 0);
+    }
+    let status = read::<OverlapStatus>(device, pair_parts.status, 1)[0];
+    assert_eq!((status.unfinished, status.unfilled, wide(status.pairs)), (0, 0, expected.pairs.len() as u64));
     let mut pairs: Vec<[u32; 2]> = read(device, found.all().into(), expected.pairs.len());
     pairs.sort_unstable();
     assert!(pairs.len() > 100 && pairs == expected.pairs);
