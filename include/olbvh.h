@@ -187,8 +187,8 @@ typedef struct olbvh_tree_info_data {
    */
   double build_ms;
   /*
-   Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. If the mesh was
-   reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
+   Device address for `olbvh_open` of olbvh.glsl, valid until the tree is freed; 0 where the device has no buffer
+   addresses. If the mesh was reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
    (`olbvh_scene_arrays`).
    */
   uint64_t address;
@@ -255,8 +255,8 @@ typedef struct olbvh_host_device {
   uint64_t queue;
   /*
    Takes the host's lock of the queue, which the host also takes for its own use of it; may be null. It is called
-   with `queue_lock` before each submission, on the thread of the owning call. Set both `lock_queue` and
-   `unlock_queue`, or neither.
+   with `queue_lock` before each submission, on the thread of the owning call, whichever that is. Set both
+   `lock_queue` and `unlock_queue`, or neither.
    */
   void (*lock_queue)(void*);
   /*
@@ -366,7 +366,7 @@ typedef struct olbvh_picture_settings {
 } olbvh_picture_settings;
 
 /*
- Geometry of a stack of layers of voxels.
+ Geometry of a stack of layers of voxels, in the coordinates of the mesh.
  */
 typedef struct olbvh_voxels {
   /*
@@ -1098,7 +1098,8 @@ extern "C" {
 #endif // __cplusplus
 
 /*
- Text of the last error of this thread; valid until the next call of this thread.
+ Text of the last error of this thread, which calls that succeed keep; empty if there was none. Valid until the next
+ call of this thread.
  */
 const char *olbvh_last_error(void);
 
@@ -1176,9 +1177,9 @@ enum olbvh_status olbvh_host_check(void (*get_instance_proc_addr)(void),
                                    struct olbvh_host_requirements *out);
 
 /*
- Makes a handle for the host's device, which must outlive everything made from the handle. Buffers are used by queues
- of that family alone, with exclusive sharing: a host that reads or writes them on another family transfers their
- ownership.
+ Makes a handle for the host's device, which must outlive everything made from the handle, and so must whatever else
+ `host` refers to: its functions, `queue_lock` and the pipeline cache. Buffers are used by queues of that family alone,
+ with exclusive sharing: a host that reads or writes them on another family transfers their ownership.
  */
 enum olbvh_status olbvh_gpu_from_host(const struct olbvh_host_device *host,
                                       struct olbvh_gpu **out);
@@ -1198,9 +1199,9 @@ enum olbvh_status olbvh_locate(const struct olbvh_tree *tree,
 
 /*
  Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), wherever they lie:
- the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away. That is limited to between half of the mesh's
- largest extent and all of it. `barycentrics` gets four floats per point, in the order of the tetrahedron's vertices,
- `distances` one, NaN without a place; each may be null.
+ the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away, a length like the coordinates. That is limited
+ to between half of the mesh's largest extent and all of it. `barycentrics` gets four floats per point, in the order of
+ the tetrahedron's vertices, and `distances` one, NaN without a place; each of these two may be null.
  */
 enum olbvh_status olbvh_nearest(const struct olbvh_tree *tree,
                                 const float *points,
@@ -1231,9 +1232,9 @@ enum olbvh_status olbvh_render(const struct olbvh_tree *tree,
  Slices a mesh conservatively: no voxel that the mesh touches is left empty. `answers`, if not null, gets a word per
  voxel, layer by layer and row by row: the tetrahedron that contains its centre; if there is none, 2^31 plus the
  tetrahedron nearest to its centre of those that touch its box; `UINT32_MAX` if the voxel is empty. `results`, if not
- null, gets a float per voxel: the value of the field (`values` and `on_cells` as for `olbvh_render`), NaN if the
- voxel is empty. A voxel that is merely touched gets the value at the tetrahedron's point nearest to its centre or,
- if `linear` is not 0, the tetrahedron's linear field extrapolated to its centre.
+ null, gets a float per voxel: the value of the field (`values` and `on_cells` as for `olbvh_render`; not read if
+ `results` is null), NaN if the voxel is empty. A voxel that is merely touched gets the value at the tetrahedron's point
+ nearest to its centre or, if `linear` is not 0, the tetrahedron's linear field extrapolated to its centre.
  */
 enum olbvh_status olbvh_slice(const struct olbvh_tree *tree,
                               const struct olbvh_voxels *voxels,
@@ -1246,7 +1247,7 @@ enum olbvh_status olbvh_slice(const struct olbvh_tree *tree,
 /*
  Finds the tetrahedra of each mesh that intersect the other mesh. The points of both meshes are in the same
  coordinate system. In `hits_a` and `hits_b`, bit i % 32 of word i / 32 is set if tetrahedron i intersects the other
- mesh; each has one word per 32 tetrahedra, rounded up. Both trees must have been made with the same `olbvh_gpu`.
+ mesh; each gets one word per 32 tetrahedra, rounded up. Both trees must have been made with the same `olbvh_gpu`.
  */
 enum olbvh_status olbvh_overlap(const struct olbvh_tree *a,
                                 const struct olbvh_tree *b,
@@ -1311,9 +1312,9 @@ enum olbvh_status olbvh_plan_measure(const struct olbvh_gpu *gpu,
                                      struct olbvh_plan_sizes *out);
 
 /*
- Makes a scene for a plan. `positions` and `cells` (four indices per tetrahedron) are read whenever its tree is
- built; `memory` and `scratch` have the sizes that `olbvh_plan_measure` reported. The host keeps the buffers as long
- as it records with the scene.
+ Makes a scene for a plan. `positions` (32-bit floats, three per point at the distance of the plan's `stride`) and `cells`
+ (four indices per tetrahedron) are read whenever its tree is built; `memory` and `scratch` have the sizes that
+ `olbvh_plan_measure` reported. The host keeps the buffers as long as it records with the scene.
  */
 enum olbvh_status olbvh_scene_place(const struct olbvh_gpu *gpu,
                                     const struct olbvh_plan *plan,

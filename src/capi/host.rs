@@ -97,8 +97,8 @@ pub struct OlbvhHostDevice {
     /// skipped.
     pub queue: u64,
     /// Takes the host's lock of the queue, which the host also takes for its own use of it; may be null. It is called
-    /// with `queue_lock` before each submission, on the thread of the owning call. Set both `lock_queue` and
-    /// `unlock_queue`, or neither.
+    /// with `queue_lock` before each submission, on the thread of the owning call, whichever that is. Set both
+    /// `lock_queue` and `unlock_queue`, or neither.
     pub lock_queue: Option<unsafe extern "C" fn(*mut c_void)>,
     /// Releases the host's lock of the queue; may be null. It is called with `queue_lock` after each submission.
     pub unlock_queue: Option<unsafe extern "C" fn(*mut c_void)>,
@@ -164,9 +164,9 @@ impl Drop for HostLock {
     }
 }
 
-/// Makes a handle for the host's device, which must outlive everything made from the handle. Buffers are used by queues
-/// of that family alone, with exclusive sharing: a host that reads or writes them on another family transfers their
-/// ownership.
+/// Makes a handle for the host's device, which must outlive everything made from the handle, and so must whatever else
+/// `host` refers to: its functions, `queue_lock` and the pipeline cache. Buffers are used by queues of that family alone,
+/// with exclusive sharing: a host that reads or writes them on another family transfers their ownership.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
     border(|| {

@@ -187,8 +187,8 @@ pub struct OlbvhTreeInfo {
     pub bad_cells: u32,
     /// Device time of the construction in milliseconds.
     pub build_ms: f64,
-    /// Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. If the mesh was
-    /// reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
+    /// Device address for `olbvh_open` of olbvh.glsl, valid until the tree is freed; 0 where the device has no buffer
+    /// addresses. If the mesh was reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
     /// (`olbvh_scene_arrays`).
     pub address: u64,
 }
@@ -347,7 +347,8 @@ unsafe fn release<T>(pointer: *mut T, what: &str) {
     }
 }
 
-/// Text of the last error of this thread; valid until the next call of this thread.
+/// Text of the last error of this thread, which calls that succeed keep; empty if there was none. Valid until the next
+/// call of this thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_last_error() -> *const c_char {
     MESSAGE.with(|m| m.borrow().as_ptr())

@@ -53,7 +53,7 @@ pub struct OlbvhPictureSettings {
     pub light: [f32; 3],
 }
 
-/// Geometry of a stack of layers of voxels.
+/// Geometry of a stack of layers of voxels, in the coordinates of the mesh.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhVoxels {
@@ -219,9 +219,9 @@ pub unsafe extern "C" fn olbvh_locate(
 }
 
 /// Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), wherever they lie:
-/// the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away. That is limited to between half of the mesh's
-/// largest extent and all of it. `barycentrics` gets four floats per point, in the order of the tetrahedron's vertices,
-/// `distances` one, NaN without a place; each may be null.
+/// the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away, a length like the coordinates. That is limited
+/// to between half of the mesh's largest extent and all of it. `barycentrics` gets four floats per point, in the order of
+/// the tetrahedron's vertices, and `distances` one, NaN without a place; each of these two may be null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_nearest(
     tree: *const OlbvhTree,
@@ -302,9 +302,9 @@ pub unsafe extern "C" fn olbvh_render(
 /// Slices a mesh conservatively: no voxel that the mesh touches is left empty. `answers`, if not null, gets a word per
 /// voxel, layer by layer and row by row: the tetrahedron that contains its centre; if there is none, 2^31 plus the
 /// tetrahedron nearest to its centre of those that touch its box; `UINT32_MAX` if the voxel is empty. `results`, if not
-/// null, gets a float per voxel: the value of the field (`values` and `on_cells` as for `olbvh_render`), NaN if the
-/// voxel is empty. A voxel that is merely touched gets the value at the tetrahedron's point nearest to its centre or,
-/// if `linear` is not 0, the tetrahedron's linear field extrapolated to its centre.
+/// null, gets a float per voxel: the value of the field (`values` and `on_cells` as for `olbvh_render`; not read if
+/// `results` is null), NaN if the voxel is empty. A voxel that is merely touched gets the value at the tetrahedron's point
+/// nearest to its centre or, if `linear` is not 0, the tetrahedron's linear field extrapolated to its centre.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_slice(
     tree: *const OlbvhTree,
@@ -341,7 +341,7 @@ pub unsafe extern "C" fn olbvh_slice(
 
 /// Finds the tetrahedra of each mesh that intersect the other mesh. The points of both meshes are in the same
 /// coordinate system. In `hits_a` and `hits_b`, bit i % 32 of word i / 32 is set if tetrahedron i intersects the other
-/// mesh; each has one word per 32 tetrahedra, rounded up. Both trees must have been made with the same `olbvh_gpu`.
+/// mesh; each gets one word per 32 tetrahedra, rounded up. Both trees must have been made with the same `olbvh_gpu`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_overlap(a: *const OlbvhTree, b: *const OlbvhTree, hits_a: *mut u32, hits_b: *mut u32) -> OlbvhStatus {
     border(|| {

@@ -196,9 +196,9 @@ pub unsafe extern "C" fn olbvh_plan_measure(gpu: *const OlbvhGpu, plan: *const O
     })
 }
 
-/// Makes a scene for a plan. `positions` and `cells` (four indices per tetrahedron) are read whenever its tree is
-/// built; `memory` and `scratch` have the sizes that `olbvh_plan_measure` reported. The host keeps the buffers as long
-/// as it records with the scene.
+/// Makes a scene for a plan. `positions` (32-bit floats, three per point at the distance of the plan's `stride`) and `cells`
+/// (four indices per tetrahedron) are read whenever its tree is built; `memory` and `scratch` have the sizes that
+/// `olbvh_plan_measure` reported. The host keeps the buffers as long as it records with the scene.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_scene_place(
     gpu: *const OlbvhGpu,
