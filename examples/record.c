@@ -191,17 +191,20 @@ int main(int argc, char **argv) {
     static uint32_t answers[LAYER * LAYER * LAYERS];
     check(olbvh_render(tree, &settings, values, 0, pixels), "drawing");
     check(olbvh_slice(tree, &slicing.voxels, values, 0, 0, answers, results), "slicing");
-    const uint32_t *counted = (const uint32_t *)((const char *)picture_bytes + drawn.status.offset);
-    const uint32_t *kinds = (const uint32_t *)((const char *)slice_bytes + sliced.status.offset);
+    const olbvh_picture_status *counted = (const olbvh_picture_status *)((const char *)picture_bytes + drawn.status.offset);
+    const olbvh_slice_status *kinds = (const olbvh_slice_status *)((const char *)slice_bytes + sliced.status.offset);
     int same_picture = !memcmp((char *)picture_bytes + drawn.colors.offset, pixels, sizeof pixels);
     int same_slice = !memcmp((char *)slice_bytes + sliced.answers.offset, answers, sizeof answers)
                      && !memcmp((char *)slice_bytes + sliced.values.offset, results, sizeof results);
-    printf("picture: %u samples in the mesh, %u skipped, %u rays left: %s\n", counted[3], counted[5], counted[7], same_picture ? "the same" : "ANOTHER");
-    printf("slice: %u voxels inside, %u touched, %u empty: %s\n", kinds[3], kinds[4], kinds[5], same_slice ? "the same" : "ANOTHER");
+    printf("picture: %u samples in the mesh, %u skipped, %u rays left: %s\n", counted->found[0], counted->skipped[0], counted->unfinished,
+           same_picture ? "the same" : "ANOTHER");
+    printf("slice: %u voxels inside, %u touched, %u empty: %s\n", kinds->inside, kinds->touched, kinds->empty,
+           same_slice ? "the same" : "ANOTHER");
     olbvh_tree_free(tree);
     olbvh_mesh_free(mesh);
     olbvh_recording_free(recording);
     olbvh_scene_free(scene);
     olbvh_gpu_free(gpu);
-    return !(same_picture && same_slice && counted[3] > 0 && counted[7] == 0 && kinds[3] > 0 && kinds[4] > 0);
+    int finished = !counted->unfinished && !kinds->locating && !kinds->touching;
+    return !(same_picture && same_slice && finished && counted->found[0] && kinds->inside && kinds->touched);
 }

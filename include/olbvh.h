@@ -5,6 +5,13 @@
  * handle at the same time, except a recording, which only one thread may use at a time. Structs and arrays that are
  * passed to a function are read during the call and need not live longer.
  *
+ * Pointers: each points to as many elements as its function states, valid during the call and aligned for their type, or
+ * is null where the function says so. What a function writes overlaps no other argument, and nothing else uses it
+ * meanwhile. Handles are those that this library returned; no handle is used after it was freed, or freed during a call
+ * that uses it. Strings end with a zero byte. A call with a misaligned pointer, or with null where that is not allowed,
+ * returns OLBVH_STATUS_INVALID; whatever else contradicts this is undefined behaviour. After an error, places of
+ * handles and structs are as they were before the call; arrays may have been written in part.
+ *
  * Recording: functions olbvh_cmd_... append commands to a command buffer of the host, which may belong to any queue
  * family with compute and must not be inside a render pass. They do not submit, wait, allocate or read back anything.
  * - Memory: sizes are known first. olbvh_plan_measure measures a plan; for every query a function olbvh_..._parts
@@ -180,8 +187,8 @@ typedef struct olbvh_tree_info_data {
    */
   double build_ms;
   /*
-   Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. If the mesh was
-   reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
+   Device address for `olbvh_open` of olbvh.glsl, valid until the tree is freed; 0 where the device has no buffer
+   addresses. If the mesh was reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
    (`olbvh_scene_arrays`).
    */
   uint64_t address;
@@ -248,8 +255,8 @@ typedef struct olbvh_host_device {
   uint64_t queue;
   /*
    Takes the host's lock of the queue, which the host also takes for its own use of it; may be null. It is called
-   with `queue_lock` before each submission, on the thread of the owning call. Set both `lock_queue` and
-   `unlock_queue`, or neither.
+   with `queue_lock` before each submission, on the thread of the owning call, whichever that is. Set both
+   `lock_queue` and `unlock_queue`, or neither.
    */
   void (*lock_queue)(void*);
   /*
@@ -359,7 +366,7 @@ typedef struct olbvh_picture_settings {
 } olbvh_picture_settings;
 
 /*
- Geometry of a stack of layers of voxels.
+ Geometry of a stack of layers of voxels, in the coordinates of the mesh.
  */
 typedef struct olbvh_voxels {
   /*
@@ -612,8 +619,7 @@ typedef struct olbvh_nearest_parts_data {
    */
   uint64_t bytes;
   /*
-   Four words per point. The third is the tetrahedron with the closest place, or `UINT32_MAX`; the fourth, a float, is
-   the squared distance times (scale · 2^19)², with the scale of the mesh's grid.
+   An `olbvh_near_state` per point.
    */
   struct olbvh_buffer states;
   /*
@@ -751,8 +757,7 @@ typedef struct olbvh_picture_parts_data {
    */
   struct olbvh_buffer colors;
   /*
-   A word for the kernels. Then three numbers of two words each, lower word first: samples taken, samples in the mesh,
-   samples skipped. Then a word: rays that need another round.
+   An `olbvh_picture_status`.
    */
   struct olbvh_buffer status;
 } olbvh_picture_parts_data;
@@ -814,10 +819,7 @@ typedef struct olbvh_slicing_parts_data {
    */
   struct olbvh_buffer values;
   /*
-   Words, counted from 0. Words 0 and 1: runs of voxels, and voxels, that need another round; nothing else may be
-   used until both are 0. Word 2: why all voxels are empty (1: the boxes are flat, 2: they are larger than two to
-   four times the mesh), or 0. Words 3 to 5: voxels whose centre lies in the mesh, voxels that the mesh merely
-   touches, voxels that it does not touch.
+   An `olbvh_slice_status`.
    */
   struct olbvh_buffer status;
 } olbvh_slicing_parts_data;
@@ -835,7 +837,7 @@ typedef struct olbvh_overlap_parts_data {
    */
   struct olbvh_buffer hits[2];
   /*
-   For A and for B: the fifth word counts the tetrahedra that need another round; their bits are 0 until then.
+   For A and for B: an `olbvh_overlap_status`. The bits of unfinished tetrahedra are 0.
    */
   struct olbvh_buffer status[2];
 } olbvh_overlap_parts_data;
@@ -849,8 +851,7 @@ typedef struct olbvh_pair_parts_data {
    */
   uint64_t bytes;
   /*
-   Words, counted from 0. Word 4: tetrahedra of A that need another round of counting. Word 5: tetrahedra of A that
-   need another round for their pairs to be written. Words 8 and 9: number of pairs, lower word first.
+   An `olbvh_overlap_status` for A.
    */
   struct olbvh_buffer status;
 } olbvh_pair_parts_data;
@@ -960,12 +961,145 @@ typedef struct olbvh_mesh_status {
   uint32_t branched;
 } olbvh_mesh_status;
 
+/*
+ State of the search for the place of the surface that is closest to a point, which the device writes to
+ `olbvh_nearest_parts_data.states`.
+ */
+typedef struct olbvh_near_state {
+  /*
+   Where the search goes on in another round; `UINT32_MAX`: it has ended.
+   */
+  uint32_t code;
+  /*
+   How much of the leaf there is done.
+   */
+  uint32_t entry;
+  /*
+   The tetrahedron with the closest place, or `UINT32_MAX`.
+   */
+  uint32_t owner;
+  /*
+   Squared distance times (s · 2^19)², infinite without a place. s is the power of two that brings the largest extent
+   of the mesh into [1, 2): `scale` of `olbvh_Grid` in olbvh.glsl, the first of `olbvh_scene_arrays_data.bindings`.
+   */
+  float square;
+} olbvh_near_state;
+
+/*
+ Progress of a picture, which the device writes to `olbvh_picture_parts_data.status`. Numbers of two words have the
+ lower one first.
+ */
+typedef struct olbvh_picture_status {
+  /*
+   Number of rays that may meet the mesh, and of some beside them.
+   */
+  uint32_t met;
+  /*
+   Number of samples taken.
+   */
+  uint32_t samples[2];
+  /*
+   Number of samples in the mesh.
+   */
+  uint32_t found[2];
+  /*
+   Number of samples skipped, in nodes without visible values.
+   */
+  uint32_t skipped[2];
+  /*
+   Number of rays that need another round.
+   */
+  uint32_t unfinished;
+} olbvh_picture_status;
+
+/*
+ Progress and result of a slice, which the device writes to `olbvh_slicing_parts_data.status`. No result may be used,
+ and the numbers of voxels say nothing, until `locating` and `touching` are 0.
+ */
+typedef struct olbvh_slice_status {
+  /*
+   Number of runs of voxels that need another round for their centres.
+   */
+  uint32_t locating;
+  /*
+   Number of voxels that need another round for their boxes.
+   */
+  uint32_t touching;
+  /*
+   Why all voxels are empty: 1 if the boxes are flat, 2 if they are larger than two to four times the mesh. 0
+   otherwise.
+   */
+  uint32_t refused;
+  /*
+   Number of voxels whose centre lies in the mesh.
+   */
+  uint32_t inside;
+  /*
+   Number of voxels that the mesh merely touches.
+   */
+  uint32_t touched;
+  /*
+   Number of voxels that the mesh does not touch.
+   */
+  uint32_t empty;
+} olbvh_slice_status;
+
+/*
+ Progress of the search for the tetrahedra of one mesh that intersect another, or for the pairs of A, which the device
+ writes to `status` of `olbvh_overlap_parts_data` or `olbvh_pair_parts_data`. Numbers of two words have the lower one
+ first.
+ */
+typedef struct olbvh_overlap_status {
+  /*
+   Number of tetrahedra that are searched for in the other tree, since no vertex decides. This number and the next
+   three are 0 for pairs.
+   */
+  uint32_t waiting;
+  /*
+   Number of tetrahedra with a vertex in the other mesh, or that contain one of its vertices.
+   */
+  uint32_t by_vertex;
+  /*
+   Number of tetrahedra that touch a node inside of the other mesh.
+   */
+  uint32_t by_node;
+  /*
+   Number of vertices that had to be located in the list of a leaf.
+   */
+  uint32_t located;
+  /*
+   Number of tetrahedra that need another round of `olbvh_cmd_overlap` or `olbvh_cmd_count_pairs`.
+   */
+  uint32_t unfinished;
+  /*
+   Number of tetrahedra that need another round of `olbvh_cmd_list_pairs`, which does nothing before `unfinished` is 0.
+   */
+  uint32_t unfilled;
+  /*
+   Number of tests of two tetrahedra.
+   */
+  uint32_t narrow[2];
+  /*
+   Number of pairs, whether or not there was room for them. From 2^32 on, none is written.
+   */
+  uint32_t pairs[2];
+  /*
+   Not 0: nothing intersects, since a mesh has no valid tetrahedron, or a tree does not fit its capacity.
+   */
+  uint32_t empty;
+  /*
+   Unused.
+   */
+  uint32_t pad;
+} olbvh_overlap_status;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
 
 /*
- Text of the last error of this thread; valid until the next call of this thread.
+ Text of the last error of this thread, which calls that succeed keep; empty if there was none. Valid until the next
+ call of this thread.
  */
 const char *olbvh_last_error(void);
 
@@ -1043,9 +1177,9 @@ enum olbvh_status olbvh_host_check(void (*get_instance_proc_addr)(void),
                                    struct olbvh_host_requirements *out);
 
 /*
- Makes a handle for the host's device, which must outlive everything made from the handle. Buffers are used by queues
- of that family alone, with exclusive sharing: a host that reads or writes them on another family transfers their
- ownership.
+ Makes a handle for the host's device, which must outlive everything made from the handle, and so must whatever else
+ `host` refers to: its functions, `queue_lock` and the pipeline cache. Buffers are used by queues of that family alone,
+ with exclusive sharing: a host that reads or writes them on another family transfers their ownership.
  */
 enum olbvh_status olbvh_gpu_from_host(const struct olbvh_host_device *host,
                                       struct olbvh_gpu **out);
@@ -1065,9 +1199,9 @@ enum olbvh_status olbvh_locate(const struct olbvh_tree *tree,
 
 /*
  Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), wherever they lie:
- the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away. That is limited to between half of the mesh's
- largest extent and all of it. `barycentrics` gets four floats per point, in the order of the tetrahedron's vertices,
- `distances` one, NaN without a place; each may be null.
+ the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away, a length like the coordinates. That is limited
+ to between half of the mesh's largest extent and all of it. `barycentrics` gets four floats per point, in the order of
+ the tetrahedron's vertices, and `distances` one, NaN without a place; each of these two may be null.
  */
 enum olbvh_status olbvh_nearest(const struct olbvh_tree *tree,
                                 const float *points,
@@ -1098,9 +1232,9 @@ enum olbvh_status olbvh_render(const struct olbvh_tree *tree,
  Slices a mesh conservatively: no voxel that the mesh touches is left empty. `answers`, if not null, gets a word per
  voxel, layer by layer and row by row: the tetrahedron that contains its centre; if there is none, 2^31 plus the
  tetrahedron nearest to its centre of those that touch its box; `UINT32_MAX` if the voxel is empty. `results`, if not
- null, gets a float per voxel: the value of the field (`values` and `on_cells` as for `olbvh_render`), NaN if the
- voxel is empty. A voxel that is merely touched gets the value at the tetrahedron's point nearest to its centre or,
- if `linear` is not 0, the tetrahedron's linear field extrapolated to its centre.
+ null, gets a float per voxel: the value of the field (`values` and `on_cells` as for `olbvh_render`; not read if
+ `results` is null), NaN if the voxel is empty. A voxel that is merely touched gets the value at the tetrahedron's point
+ nearest to its centre or, if `linear` is not 0, the tetrahedron's linear field extrapolated to its centre.
  */
 enum olbvh_status olbvh_slice(const struct olbvh_tree *tree,
                               const struct olbvh_voxels *voxels,
@@ -1113,7 +1247,7 @@ enum olbvh_status olbvh_slice(const struct olbvh_tree *tree,
 /*
  Finds the tetrahedra of each mesh that intersect the other mesh. The points of both meshes are in the same
  coordinate system. In `hits_a` and `hits_b`, bit i % 32 of word i / 32 is set if tetrahedron i intersects the other
- mesh; each has one word per 32 tetrahedra, rounded up. Both trees must have been made with the same `olbvh_gpu`.
+ mesh; each gets one word per 32 tetrahedra, rounded up. Both trees must have been made with the same `olbvh_gpu`.
  */
 enum olbvh_status olbvh_overlap(const struct olbvh_tree *a,
                                 const struct olbvh_tree *b,
@@ -1178,9 +1312,9 @@ enum olbvh_status olbvh_plan_measure(const struct olbvh_gpu *gpu,
                                      struct olbvh_plan_sizes *out);
 
 /*
- Makes a scene for a plan. `positions` and `cells` (four indices per tetrahedron) are read whenever its tree is
- built; `memory` and `scratch` have the sizes that `olbvh_plan_measure` reported. The host keeps the buffers as long
- as it records with the scene.
+ Makes a scene for a plan. `positions` (32-bit floats, three per point at the distance of the plan's `stride`) and `cells`
+ (four indices per tetrahedron) are read whenever its tree is built; `memory` and `scratch` have the sizes that
+ `olbvh_plan_measure` reported. The host keeps the buffers as long as it records with the scene.
  */
 enum olbvh_status olbvh_scene_place(const struct olbvh_gpu *gpu,
                                     const struct olbvh_plan *plan,

@@ -1,6 +1,6 @@
 //! The C interface to a Vulkan device that the host owns.
 
-use super::{OlbvhGpu, OlbvhStatus, border, give, handle, missing, put};
+use super::{OlbvhGpu, OlbvhStatus, border, give, handle, missing, place};
 use crate::error::Error;
 use crate::gpu::{EnabledFeatures, Gpu, GpuOptions, HostDevice, HostQueue, Requirements};
 use ash::vk::{self, Handle};
@@ -32,13 +32,15 @@ pub struct OlbvhHostRequirements {
 /// `vkGetInstanceProcAddr` to a function without arguments. Returns `OLBVH_STATUS_DEVICE` if the physical device does
 /// not qualify; `olbvh_last_error` then says what it lacks.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_host_check(
+pub unsafe extern "C" fn olbvh_host_check(
     get_instance_proc_addr: Option<unsafe extern "C" fn()>,
     instance: u64,
     physical_device: u64,
     out: *mut OlbvhHostRequirements,
 ) -> OlbvhStatus {
     border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let out = unsafe { place(out)? };
         let Some(get) = get_instance_proc_addr.filter(|_| instance != 0 && physical_device != 0) else {
             return Err(missing("the loader's function or a handle"));
         };
@@ -60,7 +62,8 @@ pub extern "C" fn olbvh_host_check(
             *place = name.as_ptr();
             told.extension_count += 1;
         }
-        put(out, told)
+        out.write(told);
+        Ok(())
     })
 }
 
@@ -94,8 +97,8 @@ pub struct OlbvhHostDevice {
     /// skipped.
     pub queue: u64,
     /// Takes the host's lock of the queue, which the host also takes for its own use of it; may be null. It is called
-    /// with `queue_lock` before each submission, on the thread of the owning call. Set both `lock_queue` and
-    /// `unlock_queue`, or neither.
+    /// with `queue_lock` before each submission, on the thread of the owning call, whichever that is. Set both
+    /// `lock_queue` and `unlock_queue`, or neither.
     pub lock_queue: Option<unsafe extern "C" fn(*mut c_void)>,
     /// Releases the host's lock of the queue; may be null. It is called with `queue_lock` after each submission.
     pub unlock_queue: Option<unsafe extern "C" fn(*mut c_void)>,
@@ -156,18 +159,19 @@ impl HostLock {
 
 impl Drop for HostLock {
     fn drop(&mut self) {
-        // SAFETY: as above; the lock was taken.
+        // SAFETY: the host's function, with the argument that it gave for it; `take` has locked.
         unsafe { self.0(self.1) };
     }
 }
 
-/// Makes a handle for the host's device, which must outlive everything made from the handle. Buffers are used by queues
-/// of that family alone, with exclusive sharing: a host that reads or writes them on another family transfers their
-/// ownership.
+/// Makes a handle for the host's device, which must outlive everything made from the handle, and so must whatever else
+/// `host` refers to: its functions, `queue_lock` and the pipeline cache. Buffers are used by queues of that family alone,
+/// with exclusive sharing: a host that reads or writes them on another family transfers their ownership.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
     border(|| {
-        let host = handle(host, "host")?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (host, out) = unsafe { (handle(host, "host")?, place(out)?) };
         let null = [host.instance, host.physical_device, host.device].contains(&0);
         let Some(get) = host.get_instance_proc_addr.filter(|_| !null) else {
             return Err(missing("a handle of the host's device"));
@@ -201,12 +205,11 @@ pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *m
             };
             Gpu::from_raw(lent, &GpuOptions::default())
         };
-        give(
-            out,
-            OlbvhGpu(gpu.map_err(|e| match e {
-                Error::NoDevice(why) => Error::NoDevice(format!("the host's device: {why}")),
-                other => other,
-            })?),
-        )
+        let gpu = gpu.map_err(|error| match error {
+            Error::NoDevice(why) => Error::NoDevice(format!("the host's device: {why}")),
+            other => other,
+        });
+        give(out, OlbvhGpu(gpu?));
+        Ok(())
     })
 }

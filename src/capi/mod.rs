@@ -5,8 +5,20 @@
 //! to C. A handle keeps alive what it was made from, so handles may be freed in any order. Several threads may use one
 //! handle at the same time, except a recording, which belongs to one thread at a time.
 //!
-//! The module is private: a C caller must be trusted with its pointers, which a safe Rust interface may not assume. C
-//! finds the functions by their exported names.
+//! The module is private: it is not an interface for Rust. C finds the functions by their exported names.
+//!
+//! # Safety
+//! Every unsafe function here, exported or not, asks for the same; the header tells C programs so, once for all:
+//! - A pointer that is not null points to as many elements as the function says. They stay valid during the call. What
+//!   is read is initialised, and nothing writes it meanwhile; what is written overlaps no other argument, and nothing
+//!   else uses it meanwhile.
+//! - A handle comes from this library, and is not freed before the call has ended. Only one thread at a time uses a
+//!   recording.
+//! - A string ends with a zero byte.
+//! - Handles and functions of Vulkan and of the host are what the function asks for.
+//!
+//! Pointers that are not aligned for their type are found, like null where it is not allowed; see [`check`]. What the
+//! functions make of a pointer, they do not keep after the call.
 #![allow(unsafe_code, reason = "the border to C")]
 
 mod host;
@@ -22,10 +34,11 @@ use crate::gpu::{Buffer, Gpu, GpuOptions};
 use crate::grid::MAX_LEVEL;
 use crate::mesh::{Bounds, Mesh, On};
 use crate::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
+use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::ptr::null_mut;
 use std::sync::Arc;
 
 /// Result of a call.
@@ -71,9 +84,13 @@ impl HeldMesh {
     }
 
     /// The caller's field, brought into the order of the mesh.
-    fn field(&self, values: *const f32, on_cells: u32) -> Result<(Vec<f32>, On)> {
+    ///
+    /// # Safety
+    /// See [`crate::capi`].
+    unsafe fn field(&self, values: *const f32, on_cells: u32) -> Result<(Vec<f32>, On)> {
         let (on, mesh) = (on(on_cells), self.device.input());
-        let values = array(values, if on == On::Points { mesh.points } else { mesh.tets } as usize, "values")?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let values = unsafe { array(values, if on == On::Points { mesh.points } else { mesh.tets } as usize, "values")? };
         let ids = self.ids.as_ref().map(|[cells, points]| if on == On::Points { points } else { cells });
         Ok((ids.map_or_else(|| values.to_vec(), |ids| ids.iter().map(|&i| values[i as usize]).collect()), on))
     }
@@ -170,8 +187,8 @@ pub struct OlbvhTreeInfo {
     pub bad_cells: u32,
     /// Device time of the construction in milliseconds.
     pub build_ms: f64,
-    /// Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. If the mesh was
-    /// reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
+    /// Device address for `olbvh_open` of olbvh.glsl, valid until the tree is freed; 0 where the device has no buffer
+    /// addresses. If the mesh was reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
     /// (`olbvh_scene_arrays`).
     pub address: u64,
 }
@@ -217,27 +234,62 @@ fn missing(what: &str) -> Error {
     Error::Invalid(format!("{what} is null"))
 }
 
-/// The object that a handle refers to.
-fn handle<'a, T>(pointer: *const T, what: &str) -> Result<&'a T> {
-    // SAFETY: the caller passes null or a handle that has not been freed yet (see each function).
-    unsafe { pointer.as_ref() }.ok_or_else(|| missing(what))
-}
-
-/// The object that a handle refers to, which nothing else uses during the call.
-fn handle_mut<'a, T>(pointer: *mut T, what: &str) -> Result<&'a mut T> {
-    // SAFETY: the caller passes null or a handle that has not been freed yet, and vouches that nothing else uses the
-    // object meanwhile (see each function).
-    unsafe { pointer.as_mut() }.ok_or_else(|| missing(what))
-}
-
-/// Writes a result to the caller's memory, which need not be initialised.
-fn put<T>(out: *mut T, value: T) -> Result<()> {
-    if out.is_null() {
-        return Err(missing("the place for the result"));
+/// Rejects null, and pointers that are not aligned for their type, to which there must be no reference.
+fn check<T>(pointer: *const T, what: &str) -> Result<()> {
+    if pointer.is_null() {
+        return Err(missing(what));
     }
-    // SAFETY: not null, so it is the caller's memory for a result (see each function).
-    unsafe { out.write(value) };
+    if !pointer.is_aligned() {
+        return Err(Error::Invalid(format!("{what} at address {pointer:p}, which is not a multiple of {}", align_of::<T>())));
+    }
     Ok(())
+}
+
+/// The object of a handle, or a struct.
+///
+/// # Safety
+/// See [`crate::capi`].
+unsafe fn handle<'a, T>(pointer: *const T, what: &str) -> Result<&'a T> {
+    check(pointer, what)?;
+    // SAFETY: neither null nor misaligned; the caller keeps the rules of `capi`.
+    Ok(unsafe { &*pointer })
+}
+
+/// The object of a handle that only one thread at a time uses.
+///
+/// # Safety
+/// See [`crate::capi`].
+unsafe fn handle_mut<'a, T>(pointer: *mut T, what: &str) -> Result<&'a mut T> {
+    check(pointer, what)?;
+    // SAFETY: neither null nor misaligned; the caller keeps the rules of `capi`.
+    Ok(unsafe { &mut *pointer })
+}
+
+/// A struct that may be missing, which null says.
+///
+/// # Safety
+/// See [`crate::capi`].
+unsafe fn optional<'a, T>(pointer: *const T, what: &str) -> Result<Option<&'a T>> {
+    // SAFETY: the caller keeps the rules of `capi`.
+    if pointer.is_null() { Ok(None) } else { unsafe { handle(pointer, what) }.map(Some) }
+}
+
+/// A string that may be missing, which null says.
+///
+/// # Safety
+/// See [`crate::capi`].
+unsafe fn text<'a>(pointer: *const c_char) -> Option<Cow<'a, str>> {
+    // SAFETY: the caller keeps the rules of `capi`.
+    (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) }.to_string_lossy())
+}
+
+/// The caller's memory for a result, which need not be initialised.
+///
+/// # Safety
+/// See [`crate::capi`].
+unsafe fn place<'a, T>(out: *mut T) -> Result<&'a mut MaybeUninit<T>> {
+    // SAFETY: the caller keeps the rules of `capi`.
+    unsafe { handle_mut(out.cast(), "the place for the result") }
 }
 
 /// Rejects an array larger than any memory, which a wrong count gives.
@@ -246,36 +298,57 @@ fn check_count<T>(count: usize, what: &str) -> Result<()> {
     if fits { Ok(()) } else { Err(Error::TooLarge(format!("{what}: {count} elements are more than memory can hold"))) }
 }
 
-/// The caller's array. A null pointer is allowed for an array without elements.
-fn array<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'a [T]> {
-    check_count::<T>(count, what)?;
-    match (pointer.is_null(), count) {
-        (_, 0) => Ok(&[]),
-        (true, _) => Err(missing(what)),
-        // SAFETY: the caller vouches for `count` elements (see each function), whose bytes an `isize` counts.
-        (false, _) => Ok(unsafe { std::slice::from_raw_parts(pointer, count) }),
+/// The caller's array. Any pointer is allowed for an array without elements.
+///
+/// # Safety
+/// See [`crate::capi`].
+unsafe fn array<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'a [T]> {
+    if count == 0 {
+        return Ok(&[]);
     }
+    check_count::<T>(count, what)?;
+    check(pointer, what)?;
+    // SAFETY: neither null, nor misaligned, nor too large; the caller keeps the rules of `capi`.
+    Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
+}
+
+/// The caller's array that a call fills, and which need not be initialised. Any pointer is allowed for an array without
+/// elements.
+///
+/// # Safety
+/// See [`crate::capi`].
+unsafe fn array_mut<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a mut [MaybeUninit<T>]> {
+    if count == 0 {
+        return Ok(&mut []);
+    }
+    check_count::<T>(count, what)?;
+    check(pointer, what)?;
+    // SAFETY: neither null, nor misaligned, nor too large; the caller keeps the rules of `capi`.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) })
 }
 
 /// Moves a value to the heap and passes ownership to the caller as a handle.
-fn give<T>(out: *mut *mut T, value: T) -> Result<()> {
-    // Null first: if there is no place, the value is dropped here and not lost as a pointer.
-    put(out, null_mut())?;
-    put(out, Box::into_raw(Box::new(value)))
+fn give<T>(out: &mut MaybeUninit<*mut T>, value: T) {
+    out.write(Box::into_raw(Box::new(value)));
 }
 
 /// Frees what [`give`] passed out; does nothing for null.
-fn release<T>(pointer: *mut T) {
+///
+/// # Safety
+/// See [`crate::capi`]. Nothing uses the handle again.
+unsafe fn release<T>(pointer: *mut T, what: &str) {
     if !pointer.is_null() {
         let _ = border(|| {
-            // SAFETY: the pointer came from `give`, and the caller does not use it again.
+            check(pointer, what)?;
+            // SAFETY: the pointer came from `give`, and nothing uses it again.
             drop(unsafe { Box::from_raw(pointer) });
             Ok(())
         });
     }
 }
 
-/// Text of the last error of this thread; valid until the next call of this thread.
+/// Text of the last error of this thread, which calls that succeed keep; empty if there was none. Valid until the next
+/// call of this thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_last_error() -> *const c_char {
     MESSAGE.with(|m| m.borrow().as_ptr())
@@ -298,18 +371,20 @@ pub extern "C" fn olbvh_abi() -> u32 {
 
 /// Opens a device, chosen by a part of its name or by its number; null selects the best suitable device.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_gpu_open(device: *const c_char, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_gpu_open(device: *const c_char, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
     border(|| {
-        // SAFETY: the caller passes null or a C string.
-        let name = (!device.is_null()).then(|| unsafe { CStr::from_ptr(device) }.to_string_lossy().into_owned());
-        give(out, OlbvhGpu(Gpu::new(&GpuOptions { device: name, ..GpuOptions::default() })?))
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (device, out) = unsafe { (text(device).map(Cow::into_owned), place(out)?) };
+        give(out, OlbvhGpu(Gpu::new(&GpuOptions { device, ..GpuOptions::default() })?));
+        Ok(())
     })
 }
 
 /// Frees the handle of a device; null is allowed.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_gpu_free(gpu: *mut OlbvhGpu) {
-    release(gpu);
+pub unsafe extern "C" fn olbvh_gpu_free(gpu: *mut OlbvhGpu) {
+    // SAFETY: the caller keeps the rules of `capi`.
+    unsafe { release(gpu, "gpu") };
 }
 
 /// Uploads a mesh to the device: three floats per point, four indices per tetrahedron. Invalid tetrahedra are left out
@@ -318,7 +393,7 @@ pub extern "C" fn olbvh_gpu_free(gpu: *mut OlbvhGpu) {
 /// the tetrahedra that share a face, edge or vertex, the first along the curve then owns its points, instead of the one
 /// with the lowest number.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_mesh_upload(
+pub unsafe extern "C" fn olbvh_mesh_upload(
     gpu: *const OlbvhGpu,
     points: *const f32,
     point_count: usize,
@@ -328,23 +403,26 @@ pub extern "C" fn olbvh_mesh_upload(
     out: *mut *mut OlbvhMesh,
 ) -> OlbvhStatus {
     border(|| {
-        let gpu = &handle(gpu, "gpu")?.0;
-        let points = array(points.cast::<[f32; 3]>(), point_count, "points")?;
-        let tets = array(tets.cast::<[u32; 4]>(), tet_count, "tets")?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (gpu, out) = unsafe { (&handle(gpu, "gpu")?.0, place(out)?) };
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (points, tets) = unsafe { (array(points.cast(), point_count, "points")?, array(tets.cast(), tet_count, "tets")?) };
         let (device, ids) = if reorder == 0 {
             (DeviceMesh::upload_slices(gpu, points, tets)?, None)
         } else {
             let mesh = Mesh::new(points.to_vec(), tets.to_vec()).along_curve()?;
             (DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?, mesh.cell_ids.zip(mesh.point_ids).map(<[_; 2]>::from))
         };
-        give(out, OlbvhMesh(Arc::new(HeldMesh { device, ids, copy: query::HostCopy::default() })))
+        give(out, OlbvhMesh(Arc::new(HeldMesh { device, ids, copy: query::HostCopy::default() })));
+        Ok(())
     })
 }
 
 /// Frees the handle of a mesh; null is allowed.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_mesh_free(mesh: *mut OlbvhMesh) {
-    release(mesh);
+pub unsafe extern "C" fn olbvh_mesh_free(mesh: *mut OlbvhMesh) {
+    // SAFETY: the caller keeps the rules of `capi`.
+    unsafe { release(mesh, "mesh") };
 }
 
 /// The default build options, which `olbvh_tree_build` also uses when its `options` are null.
@@ -358,30 +436,37 @@ pub extern "C" fn olbvh_default_build_options() -> OlbvhBuildOptions {
 
 /// Builds the tree over a mesh. `options` may be null: the defaults.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const OlbvhBuildOptions, out: *mut *mut OlbvhTree) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_tree_build(
+    mesh: *const OlbvhMesh,
+    options: *const OlbvhBuildOptions,
+    out: *mut *mut OlbvhTree,
+) -> OlbvhStatus {
     border(|| {
-        let mesh = handle(mesh, "mesh")?.0.clone();
-        // SAFETY: the caller passes null or valid options.
-        let options = unsafe { options.as_ref() }.map_or(Ok(BuildOptions::default()), OlbvhBuildOptions::read)?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (mesh, options, out) = unsafe { (handle(mesh, "mesh")?.0.clone(), optional(options, "options")?, place(out)?) };
+        let options = options.map_or(Ok(BuildOptions::default()), OlbvhBuildOptions::read)?;
         let device = &mesh.device;
         let gpu = device.gpu();
         let tree = Tree::build(gpu, device, &options)?;
         let addresses = gpu.upload("olbvh.tree.addresses", &[SceneBuffers::new(&device.view(), tree.memory(), None)?.addresses()])?;
-        give(out, OlbvhTree { mesh, tree, addresses })
+        give(out, OlbvhTree { mesh, tree, addresses });
+        Ok(())
     })
 }
 
 /// Frees the handle of a tree; null is allowed.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_tree_free(tree: *mut OlbvhTree) {
-    release(tree);
+pub unsafe extern "C" fn olbvh_tree_free(tree: *mut OlbvhTree) {
+    // SAFETY: the caller keeps the rules of `capi`.
+    unsafe { release(tree, "tree") };
 }
 
 /// Reports the properties of a tree.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInfo) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInfo) -> OlbvhStatus {
     border(|| {
-        let OlbvhTree { mesh, tree, addresses } = handle(tree, "tree")?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (OlbvhTree { mesh, tree, addresses }, out) = unsafe { (handle(tree, "tree")?, place(out)?) };
         let (status, Bounds { lo, hi }) = (tree.status(), tree.grid().into());
         let info = OlbvhTreeInfo {
             level: status.level,
@@ -394,6 +479,7 @@ pub extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInf
             build_ms: tree.times().total(),
             address: addresses.all().address,
         };
-        put(out, info)
+        out.write(info);
+        Ok(())
     })
 }

@@ -1,15 +1,16 @@
 //! The owning calls of the C interface: each queries a tree that olbvh owns, waits, and fills the caller's arrays.
 
-use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, tolerance};
+use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, array_mut, border, handle, text, tolerance};
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
+use crate::layout::constants::voxels::SLICE_TOUCHED;
 use crate::mesh::{Bounds, Field, Mesh, On};
 use crate::query::{LocateOptions, SILENT, locate, nearest, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
 use crate::render::{PicturePlan, Prepared, RenderSettings, TransferFunction, ValidTets};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
 use bytemuck::Pod;
-use std::ffi::{CStr, c_char};
+use std::ffi::c_char;
 use std::mem::MaybeUninit;
 use std::slice::IterMut;
 use std::sync::OnceLock;
@@ -52,7 +53,7 @@ pub struct OlbvhPictureSettings {
     pub light: [f32; 3],
 }
 
-/// Geometry of a stack of layers of voxels.
+/// Geometry of a stack of layers of voxels, in the coordinates of the mesh.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhVoxels {
@@ -75,9 +76,13 @@ pub struct OlbvhVoxels {
 }
 
 impl OlbvhPictureSettings {
-    pub(super) fn read(&self) -> Result<RenderSettings> {
-        // SAFETY: the caller passes null or a C string.
-        let text = |pointer: *const c_char| (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) }.to_string_lossy());
+    /// The settings in Rust.
+    ///
+    /// # Safety
+    /// See [`crate::capi`].
+    pub(super) unsafe fn read(&self) -> Result<RenderSettings> {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let [camera, clips, colors, opacity] = [self.camera, self.clips, self.colors, self.opacity].map(|string| unsafe { text(string) });
         let mut settings = RenderSettings {
             size: [self.width, self.height],
             iso: self.iso[..MAX_ISO.min(self.iso_count as usize)].to_vec(),
@@ -93,16 +98,16 @@ impl OlbvhPictureSettings {
         if self.iso_count as usize > MAX_ISO {
             return Err(Error::Invalid(format!("{} iso-surfaces; give up to {MAX_ISO}", self.iso_count)));
         }
-        if let Some(camera) = text(self.camera) {
+        if let Some(camera) = camera {
             settings.camera = camera.parse()?;
         }
-        if let Some(clips) = text(self.clips) {
+        if let Some(clips) = clips {
             settings.clips = clips.split_whitespace().map(str::parse).collect::<Result<_>>()?;
         }
-        if let Some(colors) = text(self.colors) {
+        if let Some(colors) = colors {
             settings.transfer = TransferFunction::named(&colors)?;
         }
-        if let Some(opacity) = text(self.opacity) {
+        if let Some(opacity) = opacity {
             settings.transfer = settings.transfer.with_opacity(TransferFunction::parse_opacity(&opacity)?)?;
         }
         Ok(settings)
@@ -170,21 +175,17 @@ impl HeldMesh {
     }
 }
 
-/// The caller's array that a call fills, and which may hold nothing yet. A null pointer is allowed for an array without
-/// elements.
-fn array_mut<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a mut [MaybeUninit<T>]> {
-    super::check_count::<T>(count, what)?;
-    match (pointer.is_null(), count) {
-        (_, 0) => Ok(&mut []),
-        (true, _) => Err(missing(what)),
-        // SAFETY: the caller vouches for memory of `count` elements that nothing else uses during the call (see each
-        // function).
-        (false, _) => Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) }),
-    }
+/// The caller's array that a call fills, unless the caller does not want it, which null says.
+///
+/// # Safety
+/// See [`crate::capi`].
+unsafe fn wanted<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a mut [MaybeUninit<T>]> {
+    // SAFETY: the caller keeps the rules of `capi`.
+    unsafe { array_mut(pointer, if pointer.is_null() { 0 } else { count }, what) }
 }
 
 /// Writes values to the places that are next, as long as there are any.
-fn put<T>(places: &mut IterMut<'_, MaybeUninit<T>>, values: impl IntoIterator<Item = T>) {
+fn fill<T>(places: &mut IterMut<'_, MaybeUninit<T>>, values: impl IntoIterator<Item = T>) {
     // In this order: the first iterator of a pair may be asked once more than the second.
     for (value, place) in values.into_iter().zip(places) {
         place.write(value);
@@ -196,7 +197,7 @@ fn put<T>(places: &mut IterMut<'_, MaybeUninit<T>>, values: impl IntoIterator<It
 /// be null. A point slightly outside of the mesh is accepted if its smallest barycentric coordinate in the nearest
 /// tetrahedron is at least `-tolerance`; a negative `tolerance` selects the default, 1e-5.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_locate(
+pub unsafe extern "C" fn olbvh_locate(
     tree: *const OlbvhTree,
     points: *const f32,
     count: usize,
@@ -205,25 +206,24 @@ pub extern "C" fn olbvh_locate(
     barycentrics: *mut f32,
 ) -> OlbvhStatus {
     border(|| {
-        let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
-        let points = array(points.cast::<[f32; 3]>(), count, "points")?;
-        let mut owners = array_mut(owners, count, "owners")?.iter_mut();
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (OlbvhTree { mesh, tree, .. }, points) = unsafe { (handle(tree, "tree")?, array(points.cast(), count, "points")?) };
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (owners, weights) = unsafe { (array_mut(owners, count, "owners")?, wanted(barycentrics.cast(), count, "barycentrics")?) };
         let options = LocateOptions { tolerance: self::tolerance(tolerance), ..LocateOptions::default() };
         let found = locate(tree, points, None, &options, SILENT)?;
-        put(&mut owners, found.owners.into_iter().map(|owner| mesh.cell(owner)));
-        if !barycentrics.is_null() {
-            put(&mut array_mut(barycentrics.cast::<[f32; 4]>(), count, "barycentrics")?.iter_mut(), found.barycentrics);
-        }
+        fill(&mut owners.iter_mut(), found.owners.into_iter().map(|owner| mesh.cell(owner)));
+        fill(&mut weights.iter_mut(), found.barycentrics);
         Ok(())
     })
 }
 
 /// Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), wherever they lie:
-/// the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away. That is limited to between half of the mesh's
-/// largest extent and all of it. `barycentrics` gets four floats per point, in the order of the tetrahedron's vertices,
-/// `distances` one, NaN without a place; each may be null.
+/// the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away, a length like the coordinates. That is limited
+/// to between half of the mesh's largest extent and all of it. `barycentrics` gets four floats per point, in the order of
+/// the tetrahedron's vertices, and `distances` one, NaN without a place; each of these two may be null.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_nearest(
+pub unsafe extern "C" fn olbvh_nearest(
     tree: *const OlbvhTree,
     points: *const f32,
     count: usize,
@@ -233,17 +233,16 @@ pub extern "C" fn olbvh_nearest(
     distances: *mut f32,
 ) -> OlbvhStatus {
     border(|| {
-        let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
-        let points = array(points.cast::<[f32; 3]>(), count, "points")?;
-        let mut owners = array_mut(owners, count, "owners")?.iter_mut();
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (OlbvhTree { mesh, tree, .. }, points) = unsafe { (handle(tree, "tree")?, array(points.cast(), count, "points")?) };
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (owners, weights) = unsafe { (array_mut(owners, count, "owners")?, wanted(barycentrics.cast(), count, "barycentrics")?) };
+        // SAFETY: the caller keeps the rules of `capi`.
+        let distances = unsafe { wanted(distances, count, "distances")? };
         let found = nearest(tree, points, within, SILENT)?;
-        if !distances.is_null() {
-            put(&mut array_mut(distances, count, "distances")?.iter_mut(), found.distances());
-        }
-        put(&mut owners, found.owners.into_iter().map(|owner| mesh.cell(owner)));
-        if !barycentrics.is_null() {
-            put(&mut array_mut(barycentrics.cast::<[f32; 4]>(), count, "barycentrics")?.iter_mut(), found.barycentrics);
-        }
+        fill(&mut distances.iter_mut(), found.distances());
+        fill(&mut owners.iter_mut(), found.owners.into_iter().map(|owner| mesh.cell(owner)));
+        fill(&mut weights.iter_mut(), found.barycentrics);
         Ok(())
     })
 }
@@ -278,7 +277,7 @@ pub extern "C" fn olbvh_default_picture_settings() -> OlbvhPictureSettings {
 /// adds the background. The mesh is read back to host memory, once, when settings first need it there: with shading, or
 /// if `opacity`, `range`, or `eye` of `camera` is not given.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_render(
+pub unsafe extern "C" fn olbvh_render(
     tree: *const OlbvhTree,
     settings: *const OlbvhPictureSettings,
     values: *const f32,
@@ -286,16 +285,16 @@ pub extern "C" fn olbvh_render(
     pixels: *mut f32,
 ) -> OlbvhStatus {
     border(|| {
-        let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
-        let settings = handle(settings, "settings")?.read()?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (OlbvhTree { mesh, tree, .. }, settings) = unsafe { (handle(tree, "tree")?, handle(settings, "settings")?.read()?) };
         settings.check()?;
         let [width, height] = settings.size.map(|n| n as usize);
-        let mut pixels = array_mut(pixels.cast::<[f32; 4]>(), width * height, "pixels")?.iter_mut();
-        let (values, on) = mesh.field(values, on_cells)?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (pixels, (values, on)) = unsafe { (array_mut(pixels.cast(), width * height, "pixels")?, mesh.field(values, on_cells)?) };
         let field = Field { name: "values".into(), on, values };
         let (plan, normals) = mesh.prepare(&settings, tree.grid().into(), &field)?;
         let normals = (!normals.is_empty()).then_some(&normals[..]);
-        put(&mut pixels, render(tree, &plan, (&field.values, on), normals, SILENT)?.colors);
+        fill(&mut pixels.iter_mut(), render(tree, &plan, (&field.values, on), normals, SILENT)?.colors);
         Ok(())
     })
 }
@@ -303,11 +302,11 @@ pub extern "C" fn olbvh_render(
 /// Slices a mesh conservatively: no voxel that the mesh touches is left empty. `answers`, if not null, gets a word per
 /// voxel, layer by layer and row by row: the tetrahedron that contains its centre; if there is none, 2^31 plus the
 /// tetrahedron nearest to its centre of those that touch its box; `UINT32_MAX` if the voxel is empty. `results`, if not
-/// null, gets a float per voxel: the value of the field (`values` and `on_cells` as for `olbvh_render`), NaN if the
-/// voxel is empty. A voxel that is merely touched gets the value at the tetrahedron's point nearest to its centre or,
-/// if `linear` is not 0, the tetrahedron's linear field extrapolated to its centre.
+/// null, gets a float per voxel: the value of the field (`values` and `on_cells` as for `olbvh_render`; not read if
+/// `results` is null), NaN if the voxel is empty. A voxel that is merely touched gets the value at the tetrahedron's point
+/// nearest to its centre or, if `linear` is not 0, the tetrahedron's linear field extrapolated to its centre.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_slice(
+pub unsafe extern "C" fn olbvh_slice(
     tree: *const OlbvhTree,
     voxels: *const OlbvhVoxels,
     values: *const f32,
@@ -317,19 +316,21 @@ pub extern "C" fn olbvh_slice(
     results: *mut f32,
 ) -> OlbvhStatus {
     border(|| {
-        let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
-        let voxels = handle(voxels, "voxels")?.read();
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (OlbvhTree { mesh, tree, .. }, voxels) = unsafe { (handle(tree, "tree")?, handle(voxels, "voxels")?.read()) };
         voxels.check()?;
         let count = usize::try_from(voxels.voxels()).map_err(|_| Error::TooLarge(format!("{} voxels", voxels.voxels())))?;
-        let mut answers = array_mut(answers, if answers.is_null() { 0 } else { count }, "answers")?.iter_mut();
-        let mut results = array_mut(results, if results.is_null() { 0 } else { count }, "results")?.iter_mut();
-        let field = if results.len() > 0 { Some(mesh.field(values, on_cells)?) } else { None };
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (answers, results) = unsafe { (wanted(answers, count, "answers")?, wanted(results, count, "results")?) };
+        // SAFETY: the caller keeps the rules of `capi`.
+        let field = if results.is_empty() { None } else { Some(unsafe { mesh.field(values, on_cells)? }) };
+        let (mut answers, mut results) = (answers.iter_mut(), results.iter_mut());
         let extrapolate = if linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
         let mut sink = |band: Band| {
-            let touched = |kind: u8| if kind == TOUCHED { 1 << 31 } else { 0 };
+            let touched = |kind: u8| if kind == TOUCHED { SLICE_TOUCHED } else { 0 };
             let owners = band.owners.iter().zip(&band.kinds).map(|(&owner, &kind)| mesh.cell(owner) | touched(kind));
-            put(&mut answers, owners);
-            put(&mut results, band.values);
+            fill(&mut answers, owners);
+            fill(&mut results, band.values);
             Ok(())
         };
         let field = field.as_ref().map(|(values, on)| (&values[..], *on));
@@ -340,20 +341,22 @@ pub extern "C" fn olbvh_slice(
 
 /// Finds the tetrahedra of each mesh that intersect the other mesh. The points of both meshes are in the same
 /// coordinate system. In `hits_a` and `hits_b`, bit i % 32 of word i / 32 is set if tetrahedron i intersects the other
-/// mesh; each has one word per 32 tetrahedra, rounded up. Both trees must have been made with the same `olbvh_gpu`.
+/// mesh; each gets one word per 32 tetrahedra, rounded up. Both trees must have been made with the same `olbvh_gpu`.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_overlap(a: *const OlbvhTree, b: *const OlbvhTree, hits_a: *mut u32, hits_b: *mut u32) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_overlap(a: *const OlbvhTree, b: *const OlbvhTree, hits_a: *mut u32, hits_b: *mut u32) -> OlbvhStatus {
     border(|| {
-        let [a, b] = [handle(a, "a")?, handle(b, "b")?];
+        // SAFETY: the caller keeps the rules of `capi`.
+        let [a, b] = unsafe { [handle(a, "a")?, handle(b, "b")?] };
         let words = |tree: &OlbvhTree| tree.mesh.device.input().tets.div_ceil(32) as usize;
-        let hits = [array_mut(hits_a, words(a), "hits_a")?.iter_mut(), array_mut(hits_b, words(b), "hits_b")?.iter_mut()];
+        // SAFETY: the caller keeps the rules of `capi`.
+        let hits = unsafe { [array_mut(hits_a, words(a), "hits_a")?, array_mut(hits_b, words(b), "hits_b")?] };
         let found = overlap(&a.tree, &b.tree, false, SILENT)?.overlap;
-        for ((mut hits, tree), found) in hits.into_iter().zip([a, b]).zip([found.a, found.b]) {
+        for ((hits, tree), found) in hits.into_iter().zip([a, b]).zip([found.a, found.b]) {
             let mut bits = vec![0; words(tree)];
             for cell in found.into_iter().map(|tet| tree.mesh.cell(tet)) {
                 bits[(cell / 32) as usize] |= 1 << (cell % 32);
             }
-            put(&mut hits, bits);
+            fill(&mut hits.iter_mut(), bits);
         }
         Ok(())
     })

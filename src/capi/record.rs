@@ -11,7 +11,7 @@ mod slice;
 #[cfg(test)]
 pub(super) use {locate::*, overlap::*, render::*, scene::*, slice::*};
 
-use super::{OlbvhGpu, OlbvhStatus, border, give, handle, handle_mut, put, release};
+use super::{OlbvhGpu, OlbvhStatus, border, give, handle, handle_mut, place, release};
 use crate::error::{Error, Result};
 use crate::gpu::{ALIGNMENT, Arena, BufferRef, DescriptorPools, DescriptorRoom, Gpu, Recorder};
 use crate::mesh::On;
@@ -142,21 +142,33 @@ impl Drop for OlbvhRecording {
     }
 }
 
+// Several threads may use one of these handles at the same time, and any thread may free it. A recording, which owns what
+// its pointers refer to, passes from thread to thread.
+const _: () = {
+    const fn shared<T: Send + Sync>() {}
+    const fn passed<T: Send>() {}
+    let _ = (shared::<OlbvhGpu>, shared::<super::OlbvhMesh>, shared::<super::OlbvhTree>, shared::<scene::OlbvhScene>);
+    let _ = (passed::<Gpu>, passed::<DescriptorPools>, passed::<Recorder<'static>>);
+};
+
 /// Makes a recording: one per frame in flight, used by one thread at a time.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_recording_new(gpu: *const OlbvhGpu, out: *mut *mut OlbvhRecording) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_recording_new(gpu: *const OlbvhGpu, out: *mut *mut OlbvhRecording) -> OlbvhStatus {
     border(|| {
-        let gpu = handle(gpu, "gpu")?.0.clone();
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (gpu, out) = unsafe { (handle(gpu, "gpu")?.0.clone(), place(out)?) };
         let pools = Box::into_raw(Box::new(DescriptorPools::new(&gpu)));
         let (gpu, reserved) = (Box::into_raw(Box::new(gpu)), DescriptorRoom::default());
-        give(out, OlbvhRecording { recorder: None, gpu, pools, reserved, stages: Vec::new() })
+        give(out, OlbvhRecording { recorder: None, gpu, pools, reserved, stages: Vec::new() });
+        Ok(())
     })
 }
 
 /// Frees a recording after its commands have been executed; null is allowed.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_recording_free(recording: *mut OlbvhRecording) {
-    release(recording);
+pub unsafe extern "C" fn olbvh_recording_free(recording: *mut OlbvhRecording) {
+    // SAFETY: the caller keeps the rules of `capi`.
+    unsafe { release(recording, "recording") };
 }
 
 /// Starts a recording and forgets the previous one, whose commands must have been executed. `commands` is a
@@ -167,9 +179,15 @@ pub extern "C" fn olbvh_recording_free(recording: *mut OlbvhRecording) {
 /// (`timestampValidBits` 0). The recording binds a compute pipeline, push constants, and descriptor set 0 where the
 /// device has no buffer addresses.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_recording_begin(recording: *mut OlbvhRecording, commands: u64, queries: u64, query_count: u32) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_recording_begin(
+    recording: *mut OlbvhRecording,
+    commands: u64,
+    queries: u64,
+    query_count: u32,
+) -> OlbvhStatus {
     border(|| {
-        let recording = handle_mut(recording, "recording")?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let recording = unsafe { handle_mut(recording, "recording")? };
         recording.recorder = None;
         // SAFETY: both pointers stay valid until the recorder is dropped, see `drop`, and nothing else refers to the
         // pools; the host vouches for the command buffer and the queries.
@@ -186,9 +204,10 @@ pub extern "C" fn olbvh_recording_begin(recording: *mut OlbvhRecording, commands
 /// Ends the recording; the command buffer stays in the recording state. Returns an error that names both commands if a
 /// barrier is missing between two of them.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_recording_end(recording: *mut OlbvhRecording) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_recording_end(recording: *mut OlbvhRecording) -> OlbvhStatus {
     border(|| {
-        let recording = handle_mut(recording, "recording")?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let recording = unsafe { handle_mut(recording, "recording")? };
         let recorder = recording.recorder.take().ok_or_else(not_begun)?;
         let (rehearsed, room, ended) = (recorder.commands() == vk::CommandBuffer::null(), recorder.descriptor_room(), recorder.finish());
         recording.stages = recorder.timed_stages().to_vec();
@@ -207,22 +226,25 @@ pub extern "C" fn olbvh_recording_end(recording: *mut OlbvhRecording) -> OlbvhSt
 /// Reports which queries hold the times of stage `index` (from 0) of a recording that has ended; returns an error if
 /// there is no such stage.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_recording_stage(recording: *const OlbvhRecording, index: u32, out: *mut OlbvhStage) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_recording_stage(recording: *const OlbvhRecording, index: u32, out: *mut OlbvhStage) -> OlbvhStatus {
     border(|| {
-        let stages = &handle(recording, "recording")?.stages;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (stages, out) = unsafe { (&handle(recording, "recording")?.stages, place(out)?) };
         let stage = stages.get(index as usize).ok_or_else(|| Error::Invalid(format!("stage {index} of {}", stages.len())))?;
         let mut name = [0; 64];
         name.iter_mut().zip(stage.0.bytes().take(63)).for_each(|(c, b)| *c = b as c_char);
-        put(out, OlbvhStage { name, begin: stage.1, end: stage.2 })
+        out.write(OlbvhStage { name, begin: stage.1, end: stage.2 });
+        Ok(())
     })
 }
 
 /// Records a barrier: what was written so far becomes visible to the compute shaders, transfers and indirect commands
 /// that follow.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_barrier(recording: *mut OlbvhRecording) -> OlbvhStatus {
-    recorded(recording, |r| {
-        r.barrier("host → host");
+pub unsafe extern "C" fn olbvh_cmd_barrier(recording: *mut OlbvhRecording) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        unsafe { begun(recording)? }.barrier("host → host");
         Ok(())
     })
 }
@@ -230,9 +252,10 @@ pub extern "C" fn olbvh_cmd_barrier(recording: *mut OlbvhRecording) -> OlbvhStat
 /// States that the host itself recorded a barrier at this place, equivalent to `olbvh_cmd_barrier` or stronger, so that
 /// `olbvh_recording_end` does not report one missing. Records nothing.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_recording_host_barrier(recording: *mut OlbvhRecording) -> OlbvhStatus {
-    recorded(recording, |r| {
-        r.host_barrier("host → host");
+pub unsafe extern "C" fn olbvh_recording_host_barrier(recording: *mut OlbvhRecording) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        unsafe { begun(recording)? }.host_barrier("host → host");
         Ok(())
     })
 }
@@ -241,7 +264,11 @@ fn not_begun() -> Error {
     Error::Invalid("the recording has not begun".into())
 }
 
-/// Runs `work` on a recording that has been started.
-fn recorded(recording: *mut OlbvhRecording, work: impl FnOnce(&mut Recorder<'static>) -> Result<()>) -> OlbvhStatus {
-    border(|| work(handle_mut(recording, "recording")?.recorder.as_mut().ok_or_else(not_begun)?))
+/// The recorder of a recording that has begun.
+///
+/// # Safety
+/// See [`crate::capi`].
+unsafe fn begun<'a>(recording: *mut OlbvhRecording) -> Result<&'a mut Recorder<'static>> {
+    // SAFETY: the caller keeps the rules of `capi`.
+    unsafe { handle_mut(recording, "recording")? }.recorder.as_mut().ok_or_else(not_begun)
 }

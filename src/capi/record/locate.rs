@@ -1,8 +1,8 @@
 //! The C interface to point location, to all owners of points, and to values at points.
 
-use super::scene::{OlbvhScene, scene_on};
-use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
-use crate::capi::{OlbvhStatus, border, handle, put, tolerance};
+use super::scene::{OlbvhScene, begun_with};
+use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds};
+use crate::capi::{OlbvhStatus, border, handle, place, tolerance};
 use crate::error::{Error, Result};
 use crate::query::{
     LocateMethod, LocateOptions, LocateOutput, NearestMemory, OwnersMemory, PointInput, PointOrder, cmd_count_owners, cmd_interpolate,
@@ -69,14 +69,30 @@ pub struct OlbvhOwnerParts {
 pub struct OlbvhNearestParts {
     /// Size of the memory in bytes.
     pub bytes: u64,
-    /// Four words per point. The third is the tetrahedron with the closest place, or `UINT32_MAX`; the fourth, a float, is
-    /// the squared distance times (scale · 2^19)², with the scale of the mesh's grid.
+    /// An `olbvh_near_state` per point.
     pub states: OlbvhBuffer,
     /// Four floats per point: barycentric coordinates of the place, in the order of the tetrahedron's vertices; zeroes if
     /// there is none.
     pub barycentrics: OlbvhBuffer,
     /// A word: the number of points that need another round.
     pub unfinished: OlbvhBuffer,
+}
+
+/// State of the search for the place of the surface that is closest to a point, which the device writes to
+/// `olbvh_nearest_parts_data.states`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "the device writes it, and C programs read it")]
+pub struct OlbvhNearState {
+    /// Where the search goes on in another round; `UINT32_MAX`: it has ended.
+    pub code: u32,
+    /// How much of the leaf there is done.
+    pub entry: u32,
+    /// The tetrahedron with the closest place, or `UINT32_MAX`.
+    pub owner: u32,
+    /// Squared distance times (s · 2^19)², infinite without a place. s is the power of two that brings the largest extent
+    /// of the mesh into [1, 2): `scale` of `olbvh_Grid` in olbvh.glsl, the first of `olbvh_scene_arrays_data.bindings`.
+    pub square: f32,
 }
 
 impl OlbvhLocation {
@@ -102,28 +118,32 @@ impl OlbvhLocation {
 
 /// Reports how much scratch memory the location needs besides the results.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_location_parts(
+pub unsafe extern "C" fn olbvh_location_parts(
     scene: *const OlbvhScene,
     location: *const OlbvhLocation,
     out: *mut OlbvhLocationParts,
 ) -> OlbvhStatus {
     border(|| {
-        let (scene, location) = (handle(scene, "scene")?, handle(location, "location")?);
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (scene, location, out) = unsafe { (handle(scene, "scene")?, handle(location, "location")?, place(out)?) };
         let sorted = location.options()?.method.is_sorted();
         let bytes = if sorted { location.memory.carve(|a| PointOrder::carve(&scene.gpu, a, location.count))?.0 } else { 0 };
-        put(out, OlbvhLocationParts { bytes })
+        out.write(OlbvhLocationParts { bytes });
+        Ok(())
     })
 }
 
 /// Records the location of points.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_locate(
+pub unsafe extern "C" fn olbvh_cmd_locate(
     recording: *mut OlbvhRecording,
     scene: *const OlbvhScene,
     location: *const OlbvhLocation,
 ) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (OlbvhScene { gpu, scene, .. }, location) = (scene_on(r, scene, "scene")?, handle(location, "location")?);
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { gpu, scene, .. }), location) =
+            unsafe { (begun_with(recording, scene, "scene")?, handle(location, "location")?) };
         let (options, mut input) = (location.options()?, location.input());
         if options.method.is_sorted() {
             let order = location.memory.place(|a| PointOrder::carve(gpu, a, location.count))?;
@@ -138,18 +158,20 @@ pub extern "C" fn olbvh_cmd_locate(
 /// Reports how much memory all owners of the points need, and where in `memory` (size 0 if it does not exist yet) the
 /// results are.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_owner_parts(
+pub unsafe extern "C" fn olbvh_owner_parts(
     scene: *const OlbvhScene,
     location: *const OlbvhLocation,
     memory: OlbvhBuffer,
     out: *mut OlbvhOwnerParts,
 ) -> OlbvhStatus {
     border(|| {
-        let (scene, location) = (handle(scene, "scene")?, handle(location, "location")?);
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (scene, location, out) = unsafe { (handle(scene, "scene")?, handle(location, "location")?, place(out)?) };
         let (bytes, parts) = memory.carve(|a| OwnersMemory::carve(&scene.gpu, a, location.count))?;
         let OwnersMemory { located, ends, total, .. } = parts;
         let (owners, barycentrics) = (located.owners.into(), located.barycentrics.into());
-        put(out, OlbvhOwnerParts { bytes, owners, barycentrics, ends: ends.into(), total: total.into() })
+        out.write(OlbvhOwnerParts { bytes, owners, barycentrics, ends: ends.into(), total: total.into() });
+        Ok(())
     })
 }
 
@@ -158,15 +180,17 @@ pub extern "C" fn olbvh_owner_parts(
 /// `olbvh_owner_parts` are correct in any case, modulo 2^32. Of `location`, only points, stride, count and tolerance
 /// are used.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_owners(
+pub unsafe extern "C" fn olbvh_cmd_owners(
     recording: *mut OlbvhRecording,
     scene: *const OlbvhScene,
     location: *const OlbvhLocation,
     memory: OlbvhBuffer,
     found: OlbvhBuffer,
 ) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (OlbvhScene { gpu, scene, .. }, location) = (scene_on(r, scene, "scene")?, handle(location, "location")?);
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { gpu, scene, .. }), location) =
+            unsafe { (begun_with(recording, scene, "scene")?, handle(location, "location")?) };
         let input = OlbvhLocation { hints: OlbvhBuffer::default(), ..*location }.input();
         let memory = memory.place(|a| OwnersMemory::carve(gpu, a, location.count))?;
         let options = LocateOptions { tolerance: tolerance(location.tolerance), ..LocateOptions::default() };
@@ -178,11 +202,14 @@ pub extern "C" fn olbvh_cmd_owners(
 /// Reports how much memory the closest places of the surface need for `count` points, and where in `memory` (size 0 if it
 /// does not exist yet) the results are.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_nearest_parts(count: u32, memory: OlbvhBuffer, out: *mut OlbvhNearestParts) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_nearest_parts(count: u32, memory: OlbvhBuffer, out: *mut OlbvhNearestParts) -> OlbvhStatus {
     border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let out = unsafe { place(out)? };
         let (bytes, parts) = memory.carve(|a| NearestMemory::carve(a, count))?;
         let NearestMemory { states, barycentrics, unfinished } = parts;
-        put(out, OlbvhNearestParts { bytes, states: states.into(), barycentrics: barycentrics.into(), unfinished: unfinished.into() })
+        out.write(OlbvhNearestParts { bytes, states: states.into(), barycentrics: barycentrics.into(), unfinished: unfinished.into() });
+        Ok(())
     })
 }
 
@@ -190,7 +217,7 @@ pub extern "C" fn olbvh_nearest_parts(count: u32, memory: OlbvhBuffer, out: *mut
 /// `location`, only points, stride and count are used. `unfinished` of `olbvh_nearest_parts` says whether more rounds are
 /// needed, which is rare.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_nearest(
+pub unsafe extern "C" fn olbvh_cmd_nearest(
     recording: *mut OlbvhRecording,
     scene: *const OlbvhScene,
     location: *const OlbvhLocation,
@@ -198,8 +225,9 @@ pub extern "C" fn olbvh_cmd_nearest(
     memory: OlbvhBuffer,
     rounds: OlbvhRounds,
 ) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (scene, location) = (&scene_on(r, scene, "scene")?.scene, handle(location, "location")?);
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { scene, .. }), location) = unsafe { (begun_with(recording, scene, "scene")?, handle(location, "location")?) };
         let input = OlbvhLocation { hints: OlbvhBuffer::default(), ..*location }.input();
         let memory = memory.place(|a| NearestMemory::carve(a, location.count))?;
         cmd_nearest(r, scene, &input, within, &memory, rounds.into())
@@ -209,15 +237,18 @@ pub extern "C" fn olbvh_cmd_nearest(
 /// Records the interpolation of a field at points that have been located: a float each in `values`, NaN for a point
 /// without an owner. Of `location`, only count, owners and barycentrics are used; compute shaders read the latter two.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_interpolate(
+pub unsafe extern "C" fn olbvh_cmd_interpolate(
     recording: *mut OlbvhRecording,
     scene: *const OlbvhScene,
     location: *const OlbvhLocation,
     field: *const OlbvhField,
     values: OlbvhBuffer,
 ) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (scene, location) = (&scene_on(r, scene, "scene")?.scene, handle(location, "location")?);
-        cmd_interpolate(r, scene, handle(field, "field")?.read(), &location.output(), values.part(), location.count)
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { scene, .. }), location) = unsafe { (begun_with(recording, scene, "scene")?, handle(location, "location")?) };
+        // SAFETY: the caller keeps the rules of `capi`.
+        let field = unsafe { handle(field, "field")? };
+        cmd_interpolate(r, scene, field.read(), &location.output(), values.part(), location.count)
     })
 }

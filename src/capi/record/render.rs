@@ -1,10 +1,10 @@
 //! The C interface to pictures, and to the ranges of values by which nodes are skipped.
 
-use super::scene::{OlbvhScene, scene_on};
-use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
+use super::scene::{OlbvhScene, begun_with};
+use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds};
 use crate::build::{cmd_ranges, range_bytes};
 use crate::capi::query::OlbvhPictureSettings;
-use crate::capi::{OlbvhStatus, border, handle, put};
+use crate::capi::{OlbvhStatus, border, handle, place};
 use crate::error::Result;
 use crate::gpu::Arena;
 use crate::layout::ViewUniforms;
@@ -76,9 +76,26 @@ pub struct OlbvhPictureParts {
     pub bytes: u64,
     /// Four floats per pixel, upper row first: colour multiplied by its opacity, and opacity.
     pub colors: OlbvhBuffer,
-    /// A word for the kernels. Then three numbers of two words each, lower word first: samples taken, samples in the mesh,
-    /// samples skipped. Then a word: rays that need another round.
+    /// An `olbvh_picture_status`.
     pub status: OlbvhBuffer,
+}
+
+/// Progress of a picture, which the device writes to `olbvh_picture_parts_data.status`. Numbers of two words have the
+/// lower one first.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "the device writes it, and C programs read it")]
+pub struct OlbvhPictureStatus {
+    /// Number of rays that may meet the mesh, and of some beside them.
+    pub met: u32,
+    /// Number of samples taken.
+    pub samples: [u32; 2],
+    /// Number of samples in the mesh.
+    pub found: [u32; 2],
+    /// Number of samples skipped, in nodes without visible values.
+    pub skipped: [u32; 2],
+    /// Number of rays that need another round.
+    pub unfinished: u32,
 }
 
 impl OlbvhPicture {
@@ -109,15 +126,17 @@ impl OlbvhPicture {
 /// is placed relative to this box, and default lengths are fractions of its diagonal. If the settings give no range of
 /// values, it is 0 to 1.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_view_make(
+pub unsafe extern "C" fn olbvh_view_make(
     settings: *const OlbvhPictureSettings,
     lo: *const f32,
     hi: *const f32,
     out: *mut OlbvhView,
 ) -> OlbvhStatus {
     border(|| {
-        let bounds = Bounds { lo: *handle(lo.cast::<[f32; 3]>(), "lo")?, hi: *handle(hi.cast::<[f32; 3]>(), "hi")? };
-        put(out, view_of(&PicturePlan::new(&handle(settings, "settings")?.read()?, &bounds, [0.0; 3], None)?))
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (settings, bounds, out) = unsafe { (handle(settings, "settings")?.read()?, bounds(lo, hi)?, place(out)?) };
+        out.write(view_of(&PicturePlan::new(&settings, &bounds, [0.0; 3], None)?));
+        Ok(())
     })
 }
 
@@ -126,7 +145,7 @@ pub extern "C" fn olbvh_view_make(
 /// Vulkan's clip space, whose y points down; negate the second row of a matrix that is used with a viewport of negative
 /// height. If `reversed` is not 0, the near plane has depth 1 and what is far depth 0, otherwise it is the other way round.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_view_make_projected(
+pub unsafe extern "C" fn olbvh_view_make_projected(
     settings: *const OlbvhPictureSettings,
     lo: *const f32,
     hi: *const f32,
@@ -135,11 +154,23 @@ pub extern "C" fn olbvh_view_make_projected(
     out: *mut OlbvhView,
 ) -> OlbvhStatus {
     border(|| {
-        let bounds = Bounds { lo: *handle(lo.cast::<[f32; 3]>(), "lo")?, hi: *handle(hi.cast::<[f32; 3]>(), "hi")? };
-        let to_clip = DMat4::from_cols_array(handle(to_clip.cast::<[f64; 16]>(), "to_clip")?);
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (settings, bounds, out) = unsafe { (handle(settings, "settings")?.read()?, bounds(lo, hi)?, place(out)?) };
+        // SAFETY: the caller keeps the rules of `capi`.
+        let to_clip = DMat4::from_cols_array(unsafe { handle(to_clip.cast(), "to_clip")? });
         let view = ProjectedView { to_clip, reversed: reversed != 0 };
-        put(out, view_of(&PicturePlan::with_projected(&handle(settings, "settings")?.read()?, &view, &bounds, [0.0; 3], None)?))
+        out.write(view_of(&PicturePlan::with_projected(&settings, &view, &bounds, [0.0; 3], None)?));
+        Ok(())
     })
+}
+
+/// The box between two corners of three floats each.
+///
+/// # Safety
+/// See [`crate::capi`].
+unsafe fn bounds(lo: *const f32, hi: *const f32) -> Result<Bounds> {
+    // SAFETY: the caller keeps the rules of `capi`.
+    unsafe { Ok(Bounds { lo: *handle(lo.cast(), "lo")?, hi: *handle(hi.cast(), "hi")? }) }
 }
 
 fn view_of(plan: &PicturePlan) -> OlbvhView {
@@ -155,42 +186,59 @@ fn view_of(plan: &PicturePlan) -> OlbvhView {
 
 /// Reports how many bytes the ranges of a field take.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_range_bytes(scene: *const OlbvhScene, out: *mut u64) -> OlbvhStatus {
-    border(|| put(out, range_bytes(handle(scene, "scene")?.scene.tree.capacity.nodes)))
+pub unsafe extern "C" fn olbvh_range_bytes(scene: *const OlbvhScene, out: *mut u64) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (scene, out) = unsafe { (handle(scene, "scene")?, place(out)?) };
+        out.write(range_bytes(scene.scene.tree.capacity.nodes));
+        Ok(())
+    })
 }
 
 /// Records the computation of the smallest and the largest value of a field in every node of the tree, into `ranges`.
 /// New values of the field need only this, not a new tree. Starts with a transfer write and ends with a barrier like
 /// that of `olbvh_cmd_barrier`.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_ranges(
+pub unsafe extern "C" fn olbvh_cmd_ranges(
     recording: *mut OlbvhRecording,
     scene: *const OlbvhScene,
     field: *const OlbvhField,
     ranges: OlbvhBuffer,
 ) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let scene = &scene_on(r, scene, "scene")?.scene;
-        cmd_ranges(r, &scene.mesh, &scene.tree, handle(field, "field")?.read(), ranges.part())
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { scene, .. }), field) = unsafe { (begun_with(recording, scene, "scene")?, handle(field, "field")?) };
+        cmd_ranges(r, &scene.mesh, &scene.tree, field.read(), ranges.part())
     })
 }
 
 /// Reports how much memory a picture needs, and where in its `memory` (size 0 if it does not exist yet) the results
 /// are.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_picture_parts(scene: *const OlbvhScene, picture: *const OlbvhPicture, out: *mut OlbvhPictureParts) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_picture_parts(
+    scene: *const OlbvhScene,
+    picture: *const OlbvhPicture,
+    out: *mut OlbvhPictureParts,
+) -> OlbvhStatus {
     border(|| {
-        let (scene, picture) = (&handle(scene, "scene")?.scene, handle(picture, "picture")?);
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (scene, picture, out) = unsafe { (&handle(scene, "scene")?.scene, handle(picture, "picture")?, place(out)?) };
         let (bytes, RenderMemory { colors, status, .. }) = picture.memory.carve(picture.carve(scene))?;
-        put(out, OlbvhPictureParts { bytes, colors: colors.into(), status: status.into() })
+        out.write(OlbvhPictureParts { bytes, colors: colors.into(), status: status.into() });
+        Ok(())
     })
 }
 
 /// Records the drawing of a picture. If nodes are skipped, transfers read the tree as well.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const OlbvhScene, picture: *const OlbvhPicture) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (scene, picture) = (&scene_on(r, scene, "scene")?.scene, handle(picture, "picture")?);
+pub unsafe extern "C" fn olbvh_cmd_render(
+    recording: *mut OlbvhRecording,
+    scene: *const OlbvhScene,
+    picture: *const OlbvhPicture,
+) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { scene, .. }), picture) = unsafe { (begun_with(recording, scene, "scene")?, handle(picture, "picture")?) };
         let memory = picture.memory.place(picture.carve(scene))?;
         cmd_render(r, scene, &picture.input()?, &memory, picture.rounds.into())
     })
@@ -201,14 +249,15 @@ pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const
 /// so that it may be the `depth` of the picture itself. Copied to a depth attachment, it hides what is drawn behind. To be
 /// recorded after the last round of `olbvh_cmd_render` and an `olbvh_cmd_barrier`.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_depths(
+pub unsafe extern "C" fn olbvh_cmd_depths(
     recording: *mut OlbvhRecording,
     scene: *const OlbvhScene,
     picture: *const OlbvhPicture,
     depths: OlbvhBuffer,
 ) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (scene, picture) = (&scene_on(r, scene, "scene")?.scene, handle(picture, "picture")?);
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { scene, .. }), picture) = unsafe { (begun_with(recording, scene, "scene")?, handle(picture, "picture")?) };
         let memory = picture.memory.place(picture.carve(scene))?;
         cmd_depths(r, &picture.input()?, &memory, depths.part())
     })

@@ -1,8 +1,8 @@
 //! The C interface to a mesh and its tree in the host's memory, and to their construction.
 
-use super::{OlbvhBuffer, OlbvhRecording, recorded};
+use super::{OlbvhBuffer, OlbvhRecording, begun};
 use crate::build::{Capacity, MAX_ENTRIES, MeshArrays, PlacedScene, SceneBytes, ScenePlan};
-use crate::capi::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, check_level, give, handle, put, release};
+use crate::capi::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, check_level, give, handle, optional, place, release};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
 use crate::gpu::{ALIGNMENT, Gpu, Recorder};
@@ -58,13 +58,29 @@ pub struct OlbvhScene {
     placed: PlacedScene,
 }
 
-/// A scene to record with, which must lie on the device of the recording.
-pub(super) fn scene_on<'a>(r: &Recorder<'_>, scene: *const OlbvhScene, what: &str) -> Result<&'a OlbvhScene> {
-    let scene = handle(scene, what)?;
-    if scene.gpu.is_same_device(r.gpu()) {
-        return Ok(scene);
+impl OlbvhScene {
+    /// The scene, which must lie on the device of the recording.
+    pub(super) fn on_device_of(&self, r: &Recorder<'_>, what: &str) -> Result<&Scene> {
+        if self.gpu.is_same_device(r.gpu()) {
+            return Ok(&self.scene);
+        }
+        Err(Error::Invalid(format!("{what} lies on another device than the recording; make both with one olbvh_gpu")))
     }
-    Err(Error::Invalid(format!("{what} lies on another device than the recording; make both with one olbvh_gpu")))
+}
+
+/// The recorder of a recording that has begun, and a scene to record with.
+///
+/// # Safety
+/// See [`crate::capi`].
+pub(super) unsafe fn begun_with<'a>(
+    recording: *mut OlbvhRecording,
+    scene: *const OlbvhScene,
+    what: &str,
+) -> Result<(&'a mut Recorder<'static>, &'a OlbvhScene)> {
+    // SAFETY: the caller keeps the rules of `capi`.
+    let (r, scene) = unsafe { (begun(recording)?, handle(scene, what)?) };
+    scene.on_device_of(r, what)?;
+    Ok((r, scene))
 }
 
 /// Where the arrays of a scene are, as olbvh.glsl needs them.
@@ -170,19 +186,21 @@ impl OlbvhPlan {
 
 /// Reports how much memory a plan needs.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_plan_measure(gpu: *const OlbvhGpu, plan: *const OlbvhPlan, out: *mut OlbvhPlanSizes) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_plan_measure(gpu: *const OlbvhGpu, plan: *const OlbvhPlan, out: *mut OlbvhPlanSizes) -> OlbvhStatus {
     border(|| {
-        let (gpu, plan) = (&handle(gpu, "gpu")?.0, handle(plan, "plan")?);
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (gpu, plan, out) = unsafe { (&handle(gpu, "gpu")?.0, handle(plan, "plan")?, place(out)?) };
         let SceneBytes { memory, scratch } = plan.read()?.bytes(gpu)?;
-        put(out, OlbvhPlanSizes { memory, scratch, alignment: ALIGNMENT, usage: gpu.usage().as_raw() })
+        out.write(OlbvhPlanSizes { memory, scratch, alignment: ALIGNMENT, usage: gpu.usage().as_raw() });
+        Ok(())
     })
 }
 
-/// Makes a scene for a plan. `positions` and `cells` (four indices per tetrahedron) are read whenever its tree is
-/// built; `memory` and `scratch` have the sizes that `olbvh_plan_measure` reported. The host keeps the buffers as long
-/// as it records with the scene.
+/// Makes a scene for a plan. `positions` (32-bit floats, three per point at the distance of the plan's `stride`) and `cells`
+/// (four indices per tetrahedron) are read whenever its tree is built; `memory` and `scratch` have the sizes that
+/// `olbvh_plan_measure` reported. The host keeps the buffers as long as it records with the scene.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_scene_place(
+pub unsafe extern "C" fn olbvh_scene_place(
     gpu: *const OlbvhGpu,
     plan: *const OlbvhPlan,
     positions: OlbvhBuffer,
@@ -192,33 +210,40 @@ pub extern "C" fn olbvh_scene_place(
     out: *mut *mut OlbvhScene,
 ) -> OlbvhStatus {
     border(|| {
-        let (gpu, plan) = (&handle(gpu, "gpu")?.0, handle(plan, "plan")?);
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (gpu, plan, out) = unsafe { (&handle(gpu, "gpu")?.0, handle(plan, "plan")?, place(out)?) };
         let (positions, cells) = (positions.aligned("positions")?, cells.aligned("cells")?);
         let placed = plan.read()?.place(gpu, positions, cells, memory.part(), scratch.part())?;
         let scene = Scene::recorded(placed.mesh, placed.tree);
         let longest_leaf = if plan.longest_leaf == 0 { scene.longest_leaf } else { plan.longest_leaf };
-        give(out, OlbvhScene { gpu: gpu.clone(), scene: Scene { longest_leaf, ..scene }, placed })
+        give(out, OlbvhScene { gpu: gpu.clone(), scene: Scene { longest_leaf, ..scene }, placed });
+        Ok(())
     })
 }
 
 /// Frees a scene, but not its buffers; null is allowed.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_scene_free(scene: *mut OlbvhScene) {
-    release(scene);
+pub unsafe extern "C" fn olbvh_scene_free(scene: *mut OlbvhScene) {
+    // SAFETY: the caller keeps the rules of `capi`.
+    unsafe { release(scene, "scene") };
 }
 
 /// Reports where the arrays of a scene are. `field`, a float per point, may be null or of size 0: none.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_scene_arrays(scene: *const OlbvhScene, field: *const OlbvhBuffer, out: *mut OlbvhSceneArrays) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_scene_arrays(
+    scene: *const OlbvhScene,
+    field: *const OlbvhBuffer,
+    out: *mut OlbvhSceneArrays,
+) -> OlbvhStatus {
     border(|| {
-        let scene = &handle(scene, "scene")?.scene;
-        // SAFETY: the caller passes null or a valid `OlbvhBuffer`.
-        let field = unsafe { field.as_ref() }.and_then(OlbvhBuffer::given);
-        let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, field)?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (scene, field, out) = unsafe { (&handle(scene, "scene")?.scene, optional(field, "field")?, place(out)?) };
+        let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, field.and_then(OlbvhBuffer::given))?;
         let [_, bindings @ ..] = buffers.list(scene.tree.status).map(OlbvhBuffer::from);
         let MeshArrays { status: mesh_status, bad, .. } = scene.mesh.arrays;
         let [status, mesh_status, bad] = [scene.tree.status, mesh_status, bad].map(OlbvhBuffer::from);
-        put(out, OlbvhSceneArrays { addresses: bytemuck::cast(buffers.addresses()), bindings, status, mesh_status, bad })
+        out.write(OlbvhSceneArrays { addresses: bytemuck::cast(buffers.addresses()), bindings, status, mesh_status, bad });
+        Ok(())
     })
 }
 
@@ -226,14 +251,22 @@ pub extern "C" fn olbvh_scene_arrays(scene: *const OlbvhScene, field: *const Olb
 /// compute shaders, uses memory and scratch in compute shaders and transfers, and ends with a barrier like that of
 /// `olbvh_cmd_barrier`.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_build(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
-    recorded(recording, |r| scene_on(r, scene, "scene")?.placed.cmd_build(r))
+pub unsafe extern "C" fn olbvh_cmd_build(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (r, scene) = unsafe { begun_with(recording, scene, "scene")? };
+        scene.placed.cmd_build(r)
+    })
 }
 
 /// As `olbvh_cmd_build`, for positions that have changed since a tree of the scene was built: neighbours, whose search
 /// takes much of that time, stay as they were found then. The cells must be the same. A tetrahedron that was or becomes
 /// bad, see `olbvh_mesh_status.bad`, has no neighbours until the next `olbvh_cmd_build`; no point is lost.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_rebuild(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
-    recorded(recording, |r| scene_on(r, scene, "scene")?.placed.cmd_rebuild(r))
+pub unsafe extern "C" fn olbvh_cmd_rebuild(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (r, scene) = unsafe { begun_with(recording, scene, "scene")? };
+        scene.placed.cmd_rebuild(r)
+    })
 }

@@ -1,9 +1,9 @@
 //! The C interface to slices.
 
-use super::scene::{OlbvhScene, scene_on};
-use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
+use super::scene::{OlbvhScene, begun_with};
+use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds};
 use crate::capi::query::OlbvhVoxels;
-use crate::capi::{OlbvhStatus, border, handle, put};
+use crate::capi::{OlbvhStatus, border, handle, place};
 use crate::query::{SliceInput, SliceMemory, cmd_slice};
 use crate::slicing::{Extrapolate, Rows};
 
@@ -41,30 +41,55 @@ pub struct OlbvhSlicingParts {
     pub answers: OlbvhBuffer,
     /// A float per voxel: the value, NaN if the voxel is empty; not written without a field.
     pub values: OlbvhBuffer,
-    /// Words, counted from 0. Words 0 and 1: runs of voxels, and voxels, that need another round; nothing else may be
-    /// used until both are 0. Word 2: why all voxels are empty (1: the boxes are flat, 2: they are larger than two to
-    /// four times the mesh), or 0. Words 3 to 5: voxels whose centre lies in the mesh, voxels that the mesh merely
-    /// touches, voxels that it does not touch.
+    /// An `olbvh_slice_status`.
     pub status: OlbvhBuffer,
+}
+
+/// Progress and result of a slice, which the device writes to `olbvh_slicing_parts_data.status`. No result may be used,
+/// and the numbers of voxels say nothing, until `locating` and `touching` are 0.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "the device writes it, and C programs read it")]
+pub struct OlbvhSliceStatus {
+    /// Number of runs of voxels that need another round for their centres.
+    pub locating: u32,
+    /// Number of voxels that need another round for their boxes.
+    pub touching: u32,
+    /// Why all voxels are empty: 1 if the boxes are flat, 2 if they are larger than two to four times the mesh. 0
+    /// otherwise.
+    pub refused: u32,
+    /// Number of voxels whose centre lies in the mesh.
+    pub inside: u32,
+    /// Number of voxels that the mesh merely touches.
+    pub touched: u32,
+    /// Number of voxels that the mesh does not touch.
+    pub empty: u32,
 }
 
 /// Reports how much memory a slice needs, and where in its `memory` (size 0 if it does not exist yet) the results are.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_slicing_parts(slicing: *const OlbvhSlicing, out: *mut OlbvhSlicingParts) -> OlbvhStatus {
+pub unsafe extern "C" fn olbvh_slicing_parts(slicing: *const OlbvhSlicing, out: *mut OlbvhSlicingParts) -> OlbvhStatus {
     border(|| {
-        let slicing = handle(slicing, "slicing")?;
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (slicing, out) = unsafe { (handle(slicing, "slicing")?, place(out)?) };
         let (bytes, memory) =
             slicing.memory.carve(|a| SliceMemory::carve(a, [slicing.voxels.width, slicing.voxels.height], slicing.rows))?;
         let SliceMemory { answers, values, status, .. } = memory;
-        put(out, OlbvhSlicingParts { bytes, answers: answers.into(), values: values.into(), status: status.into() })
+        out.write(OlbvhSlicingParts { bytes, answers: answers.into(), values: values.into(), status: status.into() });
+        Ok(())
     })
 }
 
 /// Records the slicing of rows of voxels. Transfers write the status as well.
 #[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_slice(recording: *mut OlbvhRecording, scene: *const OlbvhScene, slicing: *const OlbvhSlicing) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let (scene, slicing) = (&scene_on(r, scene, "scene")?.scene, handle(slicing, "slicing")?);
+pub unsafe extern "C" fn olbvh_cmd_slice(
+    recording: *mut OlbvhRecording,
+    scene: *const OlbvhScene,
+    slicing: *const OlbvhSlicing,
+) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let ((r, OlbvhScene { scene, .. }), slicing) = unsafe { (begun_with(recording, scene, "scene")?, handle(slicing, "slicing")?) };
         let OlbvhSlicing { layer, first, rows, field, .. } = *slicing;
         let field = (field.values.size > 0).then(|| field.read());
         let extrapolate = if slicing.linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };

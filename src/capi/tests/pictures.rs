@@ -9,7 +9,7 @@ use crate::render::Prepared;
 /// Pictures of every kind are those of the Rust interface, when the mesh is read back and afterwards. What settings do
 /// not need is not read back.
 pub fn pictures(tree: *mut OlbvhTree, values: &[f32], prepare: &dyn Fn(&OlbvhPictureSettings) -> Prepared) {
-    let OlbvhTree { mesh, tree: built, .. } = handle(tree, "tree").unwrap();
+    let OlbvhTree { mesh, tree: built, .. } = call!(handle(tree, "tree")).unwrap();
     let camera = c"eye=9,-8,7,target=2,2,1".as_ptr();
     let given = OlbvhPictureSettings { shading: 0, camera, ..settings() };
     let lit = OlbvhPictureSettings { shading: 1, ..given };
@@ -33,11 +33,11 @@ pub fn pictures(tree: *mut OlbvhTree, values: &[f32], prepare: &dyn Fn(&OlbvhPic
         assert!(expected.iter().any(|color| color[3] > 0.1), "{settings:?}");
         for _ in 0..2 {
             let mut colors = vec![[0f32; 4]; 37 * 30];
-            ok(olbvh_render(tree, &raw const settings, values.as_ptr(), 0, colors.as_mut_ptr().cast()));
+            ok(call!(olbvh_render(tree, &raw const settings, values.as_ptr(), 0, colors.as_mut_ptr().cast())));
             assert!(colors == expected && held() == needed, "{settings:?} {:?}", held());
         }
     }
     let (cells, mut colors) = (vec![0f32; mesh.device.input().tets as usize], vec![[0f32; 4]; 37 * 30]);
-    assert_eq!(olbvh_render(tree, &raw const iso, cells.as_ptr(), 1, colors.as_mut_ptr().cast()), OlbvhStatus::Invalid);
+    assert_eq!(call!(olbvh_render(tree, &raw const iso, cells.as_ptr(), 1, colors.as_mut_ptr().cast())), OlbvhStatus::Invalid);
     assert!(message().contains("a field of cells"), "{}", message());
 }

@@ -4,31 +4,31 @@ use super::queries::{Stage, place, plan, read};
 use super::*;
 use crate::build::{Capacity, TreeMemory};
 use crate::gpu::Arena;
-use crate::layout::{BuildStatus, MeshStatus};
+use crate::layout::{BuildStatus, MeshStatus, NearState, OverlapStatus, RenderStatus, SliceStatus};
 use crate::mesh::kuhn;
 use crate::reference::build::build as build_tree;
 use std::mem::offset_of;
 
 fn open() -> *mut OlbvhGpu {
-    made(|out| olbvh_gpu_open(null(), out))
+    made(|out| call!(olbvh_gpu_open(null(), out)))
 }
 
 fn arrays(stage: &Stage) -> OlbvhSceneArrays {
-    made(|out| olbvh_scene_arrays(stage.scene, null(), out))
+    made(|out| call!(olbvh_scene_arrays(stage.scene, null(), out)))
 }
 
 /// Builds a tree within a plan; returns the scene and both statuses.
 fn built(gpu: *const OlbvhGpu, mesh: &Mesh, level: u32, build: OlbvhBuildOptions) -> (Stage, BuildStatus, MeshStatus) {
-    let (stage, device) = (place(gpu, mesh, level, build), &handle(gpu, "gpu").unwrap().0);
-    let recording: *mut OlbvhRecording = made(|out| olbvh_recording_new(gpu, out));
+    let (stage, device) = (place(gpu, mesh, level, build), &call!(handle(gpu, "gpu")).unwrap().0);
+    let recording: *mut OlbvhRecording = made(|out| call!(olbvh_recording_new(gpu, out)));
     let record = |r: &mut Recorder<'_>| {
-        ok(olbvh_recording_begin(recording, r.commands().as_raw(), 0, 0));
-        ok(olbvh_cmd_build(recording, stage.scene));
-        ok(olbvh_recording_end(recording));
+        ok(call!(olbvh_recording_begin(recording, r.commands().as_raw(), 0, 0)));
+        ok(call!(olbvh_cmd_build(recording, stage.scene)));
+        ok(call!(olbvh_recording_end(recording)));
         Ok(())
     };
     device.submit("olbvh.test.build", record).unwrap();
-    olbvh_recording_free(recording);
+    call!(olbvh_recording_free(recording));
     let OlbvhSceneArrays { status, mesh_status, .. } = arrays(&stage);
     let (status, mesh_status) = (read(device, status, 1)[0], read(device, mesh_status, 1)[0]);
     (stage, status, mesh_status)
@@ -37,7 +37,7 @@ fn built(gpu: *const OlbvhGpu, mesh: &Mesh, level: u32, build: OlbvhBuildOptions
 /// The status of a tree within a plan.
 fn status(gpu: *const OlbvhGpu, mesh: &Mesh, level: u32, build: OlbvhBuildOptions) -> BuildStatus {
     let (stage, status, _) = built(gpu, mesh, level, build);
-    olbvh_scene_free(stage.scene);
+    call!(olbvh_scene_free(stage.scene));
     status
 }
 
@@ -72,17 +72,18 @@ fn a_stated_limit_gives_the_deepest_tree_that_fits() {
     let fine = OlbvhBuildOptions { level: 6, ..olbvh_default_build_options() };
     let level = |capacity: u32| status(gpu, &mesh, 0, OlbvhBuildOptions { capacity, ..fine }).level;
     assert_eq!([level(1 << 20), level(3 << 20)], [5, 6]);
-    let bytes = |slabs: u32| made(|out| olbvh_plan_measure(gpu, &plan(&mesh, 0, OlbvhBuildOptions { slabs, ..fine }), out)).memory;
+    let bytes = |slabs: u32| made(|out| call!(olbvh_plan_measure(gpu, &plan(&mesh, 0, OlbvhBuildOptions { slabs, ..fine }), out))).memory;
     assert!(bytes(1) > bytes(0), "slabs take memory");
-    let memory = |budget: u64| made(|out| olbvh_plan_measure(gpu, &plan(&mesh, 0, OlbvhBuildOptions { budget, ..fine }), out)).memory;
+    let memory =
+        |budget: u64| made(|out| call!(olbvh_plan_measure(gpu, &plan(&mesh, 0, OlbvhBuildOptions { budget, ..fine }), out))).memory;
     assert!(memory(1 << 30) == memory(1 << 40) && memory(1 << 40) < 1 << 24);
     // Fewer entries than the root may list.
     for limited in [OlbvhBuildOptions { capacity: tets - 1, ..fine }, OlbvhBuildOptions { budget: 3000, ..fine }] {
         let mut none = std::mem::MaybeUninit::uninit();
-        assert_eq!(olbvh_plan_measure(gpu, &plan(&mesh, 0, limited), none.as_mut_ptr()), OlbvhStatus::TooLarge);
+        assert_eq!(call!(olbvh_plan_measure(gpu, &plan(&mesh, 0, limited), none.as_mut_ptr())), OlbvhStatus::TooLarge);
         assert!(message().contains(&format!("plan for {tets} or more")), "{}", message());
     }
-    olbvh_gpu_free(gpu);
+    call!(olbvh_gpu_free(gpu));
 }
 
 #[test]
@@ -90,17 +91,17 @@ fn levels_have_a_default_and_a_limit() {
     let (gpu, mesh) = (open(), kuhn([3; 3]).unwrap());
     let of = |level: u32| OlbvhBuildOptions { level, ..olbvh_default_build_options() };
     let sizes = |level: u32, build: u32| {
-        let sizes: OlbvhPlanSizes = made(|out| olbvh_plan_measure(gpu, &plan(&mesh, level, of(build)), out));
+        let sizes: OlbvhPlanSizes = made(|out| call!(olbvh_plan_measure(gpu, &plan(&mesh, level, of(build)), out)));
         (sizes.memory, sizes.scratch)
     };
     assert_eq!((sizes(0, 0), sizes(0, 5), sizes(4, 9)), (sizes(7, 0), sizes(5, 0), sizes(4, 0)));
     assert_ne!(sizes(0, 0), sizes(1, 0));
     for (level, build) in [(11, 0), (0, 11), (7, 11)] {
         let mut none = std::mem::MaybeUninit::uninit();
-        assert_eq!(olbvh_plan_measure(gpu, &plan(&mesh, level, of(build)), none.as_mut_ptr()), OlbvhStatus::Invalid);
+        assert_eq!(call!(olbvh_plan_measure(gpu, &plan(&mesh, level, of(build)), none.as_mut_ptr())), OlbvhStatus::Invalid);
         assert!(message().contains("level 11; the deepest is 10"), "{}", message());
     }
-    olbvh_gpu_free(gpu);
+    call!(olbvh_gpu_free(gpu));
 }
 
 #[test]
@@ -118,10 +119,10 @@ fn recorded_builds_report_bad_cells() {
     let (stage, status, mesh_status) = built(gpu, &mesh, 0, olbvh_default_build_options());
     assert_eq!((mesh_status.bad as usize, mesh_status.overflow, status.overflow), (all.len(), 0, 0));
     assert!(mesh_status.boundary > 0 && status.entries > 0);
-    let words: Vec<u32> = read(&handle(gpu, "gpu").unwrap().0, arrays(&stage).bad, mesh.tets.len().div_ceil(32));
+    let words: Vec<u32> = read(&call!(handle(gpu, "gpu")).unwrap().0, arrays(&stage).bad, mesh.tets.len().div_ceil(32));
     assert!((0..mesh.tets.len() as u32).filter(|&i| crate::layout::bit(&words, i)).eq(all));
-    olbvh_scene_free(stage.scene);
-    olbvh_gpu_free(gpu);
+    call!(olbvh_scene_free(stage.scene));
+    call!(olbvh_gpu_free(gpu));
 }
 
 /// The structs of the header are those that the device writes.
@@ -136,25 +137,29 @@ fn statuses_have_the_layout_of_the_device() {
     same!(OlbvhMeshStatus, MeshStatus: lo hi bad boundary zero_volume negative crowded overflow branched);
     same!(OlbvhBuildStatus, BuildStatus: level wanted_level candidates entries nodes internal leaves boundary_leaves longest_leaf
         large_levels sum total levels overflow);
+    same!(OlbvhNearState, NearState: code entry owner square);
+    same!(OlbvhPictureStatus, RenderStatus: met samples found skipped unfinished);
+    same!(OlbvhSliceStatus, SliceStatus: locating touching refused inside touched empty);
+    same!(OlbvhOverlapStatus, OverlapStatus: waiting by_vertex by_node located unfinished unfilled narrow pairs empty pad);
 }
 
 #[test]
 fn a_scene_is_recorded_on_its_device() {
     let (gpu, other, mesh) = (open(), open(), kuhn([2; 3]).unwrap());
     let (here, there) = (place(gpu, &mesh, 0, olbvh_default_build_options()), place(other, &mesh, 0, olbvh_default_build_options()));
-    let recording: *mut OlbvhRecording = made(|out| olbvh_recording_new(gpu, out));
-    ok(olbvh_recording_begin(recording, 0, 0, 0));
-    ok(olbvh_cmd_build(recording, here.scene));
-    assert_eq!(olbvh_cmd_build(recording, there.scene), OlbvhStatus::Invalid);
+    let recording: *mut OlbvhRecording = made(|out| call!(olbvh_recording_new(gpu, out)));
+    ok(call!(olbvh_recording_begin(recording, 0, 0, 0)));
+    ok(call!(olbvh_cmd_build(recording, here.scene)));
+    assert_eq!(call!(olbvh_cmd_build(recording, there.scene)), OlbvhStatus::Invalid);
     assert!(message().contains("scene lies on another device"), "{}", message());
     let (nothing, once) = (OlbvhBuffer::default(), OlbvhRounds { count: 1, resume: 0 });
-    assert_eq!(olbvh_cmd_overlap(recording, here.scene, there.scene, nothing, once), OlbvhStatus::Invalid);
+    assert_eq!(call!(olbvh_cmd_overlap(recording, here.scene, there.scene, nothing, once)), OlbvhStatus::Invalid);
     assert!(message().contains("b lies on another device"), "{}", message());
-    olbvh_recording_free(recording);
+    call!(olbvh_recording_free(recording));
     for scene in [here.scene, there.scene] {
-        olbvh_scene_free(scene);
+        call!(olbvh_scene_free(scene));
     }
     for gpu in [gpu, other] {
-        olbvh_gpu_free(gpu);
+        call!(olbvh_gpu_free(gpu));
     }
 }

@@ -4,7 +4,7 @@ use super::pictures::pictures;
 use super::*;
 use crate::capi::query::*;
 use crate::gpu::Buffer;
-use crate::layout::{NearState, ViewUniforms};
+use crate::layout::{NearState, OverlapStatus, RenderStatus, SliceStatus, ViewUniforms, wide};
 use crate::mesh::{Bounds, Field};
 use crate::options::TOLERANCE;
 use crate::query::{LocateOptions, Nearest, SILENT, locate, locate_all, nearest, overlap, render, slice};
@@ -117,14 +117,14 @@ pub fn plan(mesh: &Mesh, level: u32, build: OlbvhBuildOptions) -> OlbvhPlan {
 }
 
 pub fn place(gpu: *const OlbvhGpu, mesh: &Mesh, level: u32, build: OlbvhBuildOptions) -> Stage {
-    let device = &handle(gpu, "gpu").unwrap().0;
+    let device = &call!(handle(gpu, "gpu")).unwrap().0;
     let plan = plan(mesh, level, build);
-    let sizes: OlbvhPlanSizes = made(|out| olbvh_plan_measure(gpu, &raw const plan, out));
+    let sizes: OlbvhPlanSizes = made(|out| call!(olbvh_plan_measure(gpu, &raw const plan, out)));
     let (positions, cells) = (device.upload("olbvh.test.positions", &mesh.points), device.upload("olbvh.test.cells", &mesh.tets));
     let (positions, cells) = (positions.unwrap(), cells.unwrap());
     let [memory, scratch] = [sizes.memory, sizes.scratch].map(|bytes| device.buffer("olbvh.test.memory", bytes).unwrap());
     let [p, c, m, s] = [&positions, &cells, &memory, &scratch].map(|b| OlbvhBuffer::from(b.all()));
-    let scene = made(|out| olbvh_scene_place(gpu, &raw const plan, p, c, m, s, out));
+    let scene = made(|out| call!(olbvh_scene_place(gpu, &raw const plan, p, c, m, s, out)));
     Stage { scene, positions, _held: [cells, memory, scratch] }
 }
 
@@ -143,30 +143,31 @@ pub fn read<T: Pod>(gpu: &Gpu, part: OlbvhBuffer, count: usize) -> Vec<T> {
 fn projected(settings: &OlbvhPictureSettings) {
     let to_clip = DMat4::from_cols_array(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, -0.01, 0.0, 0.0, 0.0, 0.9, 1.0]);
     let columns = to_clip.to_cols_array();
-    let make = |reversed, out| olbvh_view_make_projected(settings, LO.as_ptr(), HI.as_ptr(), columns.as_ptr(), reversed, out);
+    let make = |reversed, out| call!(olbvh_view_make_projected(settings, LO.as_ptr(), HI.as_ptr(), columns.as_ptr(), reversed, out));
     let views: [OlbvhView; 2] = [0, 1].map(|reversed| made(|out| make(reversed, out)));
     for (view, reversed) in views.iter().zip([false, true]) {
         let (view, bounds) = (&view.frame, Bounds { lo: LO, hi: HI });
         let plan =
-            PicturePlan::with_projected(&settings.read().unwrap(), &ProjectedView { to_clip, reversed }, &bounds, [0.0; 3], None).unwrap();
+            PicturePlan::with_projected(&call!(settings.read()).unwrap(), &ProjectedView { to_clip, reversed }, &bounds, [0.0; 3], None)
+                .unwrap();
         assert_eq!(bytemuck::cast_slice::<u32, u8>(&view[..size_of::<ViewUniforms>() / 4]), bytemuck::bytes_of(&plan.view()));
     }
     assert!(views[0].frame != views[1].frame);
     let mut none = std::mem::MaybeUninit::uninit();
     let flat = [0.0; 16];
-    let made = olbvh_view_make_projected(settings, LO.as_ptr(), HI.as_ptr(), flat.as_ptr(), 0, none.as_mut_ptr());
+    let made = call!(olbvh_view_make_projected(settings, LO.as_ptr(), HI.as_ptr(), flat.as_ptr(), 0, none.as_mut_ptr()));
     assert!(made == OlbvhStatus::Invalid && message().contains("without an inverse"), "{}", message());
 }
 
 /// Records all queries in one command buffer, after a rehearsal, twice.
 pub fn recorded(gpu: *mut OlbvhGpu) {
-    let device = &handle(gpu, "gpu").unwrap().0;
+    let device = &call!(handle(gpu, "gpu")).unwrap().0;
     let meshes = meshes();
     let settings = settings();
     projected(&settings);
-    let view: OlbvhView = made(|out| olbvh_view_make(&raw const settings, LO.as_ptr(), HI.as_ptr(), out));
+    let view: OlbvhView = made(|out| call!(olbvh_view_make(&raw const settings, LO.as_ptr(), HI.as_ptr(), out)));
     assert!((1..100).contains(&view.drawn_count));
-    let plan = PicturePlan::new(&settings.read().unwrap(), &Bounds { lo: LO, hi: HI }, [0.0; 3], None).unwrap();
+    let plan = PicturePlan::new(&call!(settings.read()).unwrap(), &Bounds { lo: LO, hi: HI }, [0.0; 3], None).unwrap();
     let normals = vec![[0.6, 0.0, 0.7f32]; meshes[0].points.len()];
     let expected = expected(device, &meshes, &plan, Some(&normals));
 
@@ -181,7 +182,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     let depths = device.upload("olbvh.test.depths", &[-1f32; 37 * 30]).unwrap();
     let field = OlbvhField { values: values.all().into(), on_cells: 0 };
     let buffer = |bytes: u64| device.buffer("olbvh.test.memory", bytes).unwrap();
-    let ranges = buffer(made(|out| olbvh_range_bytes(a.scene, out)));
+    let ranges = buffer(made(|out| call!(olbvh_range_bytes(a.scene, out))));
     let [once, four, eight] = [1, 4, 8].map(|count| OlbvhRounds { count, resume: 0 });
 
     let mut picture = OlbvhPicture {
@@ -197,17 +198,17 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
         memory: NOTHING,
         rounds: once,
     };
-    let parts = |picture: &OlbvhPicture| -> OlbvhPictureParts { made(|out| olbvh_picture_parts(a.scene, picture, out)) };
+    let parts = |picture: &OlbvhPicture| -> OlbvhPictureParts { made(|out| call!(olbvh_picture_parts(a.scene, picture, out))) };
     let picture_memory = buffer(parts(&picture).bytes);
     picture.memory = picture_memory.all().part(0, 1024).into();
     let mut none = std::mem::MaybeUninit::uninit();
-    assert_eq!(olbvh_picture_parts(a.scene, &raw const picture, none.as_mut_ptr()), OlbvhStatus::Invalid);
+    assert_eq!(call!(olbvh_picture_parts(a.scene, &raw const picture, none.as_mut_ptr())), OlbvhStatus::Invalid);
     picture.memory = picture_memory.all().into();
     let picture_parts = parts(&picture);
 
     let (voxels, linear) = (voxels(), 1);
     let mut slicing = OlbvhSlicing { voxels, layer: 0, first: 0, rows: 13 * 6, linear, field, memory: NOTHING, rounds: once };
-    let parts = |slicing: &OlbvhSlicing| -> OlbvhSlicingParts { made(|out| olbvh_slicing_parts(slicing, out)) };
+    let parts = |slicing: &OlbvhSlicing| -> OlbvhSlicingParts { made(|out| call!(olbvh_slicing_parts(slicing, out))) };
     let slice_memory = buffer(parts(&slicing).bytes);
     slicing.memory = slice_memory.all().into();
     let slicing_parts = parts(&slicing);
@@ -225,47 +226,47 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
         owners: owners.all().into(),
         barycentrics: answers.all().into(),
     };
-    let parts: OlbvhLocationParts = made(|out| olbvh_location_parts(a.scene, &raw const location, out));
+    let parts: OlbvhLocationParts = made(|out| call!(olbvh_location_parts(a.scene, &raw const location, out)));
     let order = buffer(parts.bytes);
     location.memory = order.all().into();
     let interpolated = buffer(4 * u64::from(count));
-    let parts = |memory| -> OlbvhOwnerParts { made(|out| olbvh_owner_parts(a.scene, &raw const location, memory, out)) };
+    let parts = |memory| -> OlbvhOwnerParts { made(|out| call!(olbvh_owner_parts(a.scene, &raw const location, memory, out))) };
     let owner_memory = buffer(parts(NOTHING).bytes);
     let owner_parts = parts(owner_memory.all().into());
     let lists = buffer(4 * expected.owners.iter().map(|l| l.len() as u64).sum::<u64>());
 
-    let parts = |memory| -> OlbvhOverlapParts { made(|out| olbvh_overlap_parts(a.scene, b.scene, memory, out)) };
+    let parts = |memory| -> OlbvhOverlapParts { made(|out| call!(olbvh_overlap_parts(a.scene, b.scene, memory, out))) };
     let overlap_memory = buffer(parts(NOTHING).bytes);
     let overlap_parts = parts(overlap_memory.all().into());
-    let parts = |memory| -> OlbvhPairParts { made(|out| olbvh_pair_parts(a.scene, memory, out)) };
+    let parts = |memory| -> OlbvhPairParts { made(|out| call!(olbvh_pair_parts(a.scene, memory, out))) };
     let pair_memory = buffer(parts(NOTHING).bytes);
     let pair_parts = parts(pair_memory.all().into());
     let found = buffer(8 * expected.pairs.len() as u64);
-    let parts = |memory| -> OlbvhNearestParts { made(|out| olbvh_nearest_parts(count, memory, out)) };
+    let parts = |memory| -> OlbvhNearestParts { made(|out| call!(olbvh_nearest_parts(count, memory, out))) };
     let near_memory = buffer(parts(NOTHING).bytes);
     let near_parts = parts(near_memory.all().into());
 
-    let recording: *mut OlbvhRecording = made(|out| olbvh_recording_new(gpu, out));
+    let recording: *mut OlbvhRecording = made(|out| call!(olbvh_recording_new(gpu, out)));
     let record = |commands: u64| {
-        ok(olbvh_recording_begin(recording, commands, 0, 0));
-        ok(olbvh_cmd_build(recording, a.scene));
-        ok(olbvh_cmd_build(recording, b.scene));
-        ok(olbvh_cmd_ranges(recording, a.scene, &raw const field, ranges.all().into()));
-        ok(olbvh_cmd_render(recording, a.scene, &raw const picture));
-        ok(olbvh_cmd_barrier(recording));
-        ok(olbvh_cmd_depths(recording, a.scene, &raw const picture, depths.all().into()));
-        ok(olbvh_cmd_slice(recording, a.scene, &raw const slicing));
-        ok(olbvh_cmd_locate(recording, a.scene, &raw const location));
-        ok(olbvh_cmd_barrier(recording));
-        ok(olbvh_cmd_interpolate(recording, a.scene, &raw const location, &raw const field, interpolated.all().into()));
+        ok(call!(olbvh_recording_begin(recording, commands, 0, 0)));
+        ok(call!(olbvh_cmd_build(recording, a.scene)));
+        ok(call!(olbvh_cmd_build(recording, b.scene)));
+        ok(call!(olbvh_cmd_ranges(recording, a.scene, &raw const field, ranges.all().into())));
+        ok(call!(olbvh_cmd_render(recording, a.scene, &raw const picture)));
+        ok(call!(olbvh_cmd_barrier(recording)));
+        ok(call!(olbvh_cmd_depths(recording, a.scene, &raw const picture, depths.all().into())));
+        ok(call!(olbvh_cmd_slice(recording, a.scene, &raw const slicing)));
+        ok(call!(olbvh_cmd_locate(recording, a.scene, &raw const location)));
+        ok(call!(olbvh_cmd_barrier(recording)));
+        ok(call!(olbvh_cmd_interpolate(recording, a.scene, &raw const location, &raw const field, interpolated.all().into())));
         // Hints are not used, whatever they are.
         let odd = OlbvhLocation { hints: OlbvhBuffer { size: 1, ..NOTHING }, ..location };
-        ok(olbvh_cmd_owners(recording, a.scene, &raw const odd, owner_memory.all().into(), lists.all().into()));
-        ok(olbvh_cmd_overlap(recording, a.scene, b.scene, overlap_memory.all().into(), four));
-        ok(olbvh_cmd_count_pairs(recording, a.scene, b.scene, pair_memory.all().into(), eight));
-        ok(olbvh_cmd_list_pairs(recording, a.scene, b.scene, pair_memory.all().into(), found.all().into(), eight));
-        ok(olbvh_cmd_nearest(recording, a.scene, &raw const odd, 1.0, near_memory.all().into(), four));
-        ok(olbvh_recording_end(recording));
+        ok(call!(olbvh_cmd_owners(recording, a.scene, &raw const odd, owner_memory.all().into(), lists.all().into())));
+        ok(call!(olbvh_cmd_overlap(recording, a.scene, b.scene, overlap_memory.all().into(), four)));
+        ok(call!(olbvh_cmd_count_pairs(recording, a.scene, b.scene, pair_memory.all().into(), eight)));
+        ok(call!(olbvh_cmd_list_pairs(recording, a.scene, b.scene, pair_memory.all().into(), found.all().into(), eight)));
+        ok(call!(olbvh_cmd_nearest(recording, a.scene, &raw const odd, 1.0, near_memory.all().into(), four)));
+        ok(call!(olbvh_recording_end(recording)));
     };
     record(0);
     let before = CALLS.get();
@@ -283,14 +284,14 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     assert!(read::<[f32; 4]>(device, picture_parts.colors, 37 * 30) == expected.colors);
     let opaque = expected.colors.iter().map(|color| color[3] >= plan.termination);
     assert!(read::<f32>(device, depths.all().into(), 37 * 30).into_iter().map(|depth| depth > 0.0).eq(opaque));
-    let [_, samples, _, found_samples, _, skipped, _, unfinished] = read::<u32>(device, picture_parts.status, 8)[..] else {
-        unreachable!()
-    };
-    assert!(unfinished == 0 && samples >= found_samples && found_samples > 500 && skipped > 100, "{samples} {found_samples} {skipped}");
+    let drawn = read::<RenderStatus>(device, picture_parts.status, 1)[0];
+    let [samples, found_samples, skipped] = [drawn.samples, drawn.found, drawn.skipped].map(wide);
+    assert!(drawn.unfinished == 0 && samples >= found_samples && found_samples > 500 && skipped > 100, "{drawn:?}");
     assert_eq!(read::<u32>(device, slicing_parts.answers, 17 * 13 * 6), expected.answers);
     assert_eq!(read::<u32>(device, slicing_parts.values, 17 * 13 * 6), expected.sliced);
-    let [0, 0, 0, inside, touched, empty] = read::<u32>(device, slicing_parts.status, 6)[..] else { panic!("voxels are left") };
-    assert!(inside > 100 && touched > 100 && empty > 100, "{inside} {touched} {empty}");
+    let voxels = read::<SliceStatus>(device, slicing_parts.status, 1)[0];
+    assert_eq!([voxels.locating, voxels.touching, voxels.refused], [0; 3], "voxels are left");
+    assert!(voxels.inside > 100 && voxels.touched > 100 && voxels.empty > 100, "{voxels:?}");
     assert!(read::<f32>(device, interpolated.all().into(), count as usize) == expected.located);
     let firsts: Vec<u32> = expected.owners.iter().map(|list| list[0]).collect();
     assert_eq!((read(device, location.owners, firsts.len()), read(device, owner_parts.owners, firsts.len())), (firsts.clone(), firsts));
@@ -303,50 +304,52 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     assert_eq!(read::<u32>(device, near_parts.unfinished, 1), [0]);
     let hits = [0, 1].map(|i| read::<u32>(device, overlap_parts.hits[i], expected.hits[i].len()));
     assert!(hits == expected.hits && hits.iter().all(|words| words.iter().any(|&w| w != 0)));
-    let status: Vec<u32> = read(device, pair_parts.status, 10);
-    assert_eq!(status[4..6], [0; 2]);
-    assert_eq!(status[8..], [expected.pairs.len() as u32, 0]);
+    for part in overlap_parts.status {
+        assert_eq!(read::<OverlapStatus>(device, part, 1)[0].unfinished, 0);
+    }
+    let status = read::<OverlapStatus>(device, pair_parts.status, 1)[0];
+    assert_eq!((status.unfinished, status.unfilled, wide(status.pairs)), (0, 0, expected.pairs.len() as u64));
     let mut pairs: Vec<[u32; 2]> = read(device, found.all().into(), expected.pairs.len());
     pairs.sort_unstable();
     assert!(pairs.len() > 100 && pairs == expected.pairs);
 
     // Buffers that are too small are refused during recording.
-    ok(olbvh_recording_begin(recording, 0, 0, 0));
+    ok(call!(olbvh_recording_begin(recording, 0, 0, 0)));
     let refused = |status: OlbvhStatus, what: &str| assert!(status == OlbvhStatus::Invalid && message().contains(what), "{}", message());
     let less = |part: OlbvhBuffer, bytes: u64| OlbvhBuffer { size: part.size - bytes, ..part };
     let short = OlbvhField { values: less(field.values, 1), ..field };
-    let slice = |slicing: OlbvhSlicing| olbvh_cmd_slice(recording, a.scene, &raw const slicing);
+    let slice = |slicing: OlbvhSlicing| call!(olbvh_cmd_slice(recording, a.scene, &raw const slicing));
     refused(slice(OlbvhSlicing { memory: less(slicing.memory, 256), ..slicing }), "memory");
     refused(slice(OlbvhSlicing { field: short, ..slicing }), "a field");
-    let locate = |location: OlbvhLocation| olbvh_cmd_locate(recording, a.scene, &raw const location);
+    let locate = |location: OlbvhLocation| call!(olbvh_cmd_locate(recording, a.scene, &raw const location));
     refused(locate(OlbvhLocation { points: less(location.points, 1), ..location }), "points");
     refused(locate(OlbvhLocation { owners: less(location.owners, 1), ..location }), "owners");
     refused(locate(OlbvhLocation { barycentrics: less(location.barycentrics, 1), ..location }), "barycentrics");
     refused(locate(OlbvhLocation { path: 0, hints: less(location.owners, 1), ..location }), "hints");
-    let interpolate = |field: &OlbvhField, values| olbvh_cmd_interpolate(recording, a.scene, &raw const location, field, values);
+    let interpolate = |field: &OlbvhField, values| call!(olbvh_cmd_interpolate(recording, a.scene, &raw const location, field, values));
     refused(interpolate(&short, interpolated.all().into()), "a field");
     refused(interpolate(&field, less(interpolated.all().into(), 1)), "values");
-    refused(olbvh_cmd_ranges(recording, a.scene, &raw const field, less(ranges.all().into(), 1)), "ranges");
-    refused(olbvh_cmd_ranges(recording, a.scene, &raw const short, ranges.all().into()), "a field");
-    let draw = |picture: OlbvhPicture| olbvh_cmd_render(recording, a.scene, &raw const picture);
+    refused(call!(olbvh_cmd_ranges(recording, a.scene, &raw const field, less(ranges.all().into(), 1))), "ranges");
+    refused(call!(olbvh_cmd_ranges(recording, a.scene, &raw const short, ranges.all().into())), "a field");
+    let draw = |picture: OlbvhPicture| call!(olbvh_cmd_render(recording, a.scene, &raw const picture));
     refused(draw(OlbvhPicture { view: less(picture.view, 8), ..picture }), "a view");
     refused(draw(OlbvhPicture { field: short, ..picture }), "a field");
     refused(draw(OlbvhPicture { normals: less(picture.normals, 1), ..picture }), "normals");
     refused(draw(OlbvhPicture { ranges: less(picture.ranges, 1), ..picture }), "ranges");
     refused(draw(OlbvhPicture { depth: less(picture.depth, 1), ..picture }), "a depth buffer");
-    olbvh_recording_free(recording);
-    olbvh_scene_free(a.scene);
-    olbvh_scene_free(b.scene);
+    call!(olbvh_recording_free(recording));
+    call!(olbvh_scene_free(a.scene));
+    call!(olbvh_scene_free(b.scene));
 }
 
 /// A stack that is sliced in several bands.
 fn large_stack(tree: *mut OlbvhTree, values: &[f32]) {
     let stack =
         OlbvhVoxels { next_voxel: [0.007, 0.0, 0.0], next_row: [0.0, 0.004, 0.0], width: 1000, height: 1400, layers: 2, ..voxels() };
-    let held = handle(tree, "tree").unwrap();
+    let held = call!(handle(tree, "tree")).unwrap();
     let expected = sliced(&held.tree, Some((values, On::Points)), &stack);
     let (mut answers, mut found) = (vec![0u32; 2_800_000], vec![0f32; 2_800_000]);
-    ok(olbvh_slice(tree, &raw const stack, values.as_ptr(), 0, 1, answers.as_mut_ptr(), found.as_mut_ptr()));
+    ok(call!(olbvh_slice(tree, &raw const stack, values.as_ptr(), 0, 1, answers.as_mut_ptr(), found.as_mut_ptr())));
     assert!(expected.2 > 2 && expected.0 == answers, "{} bands", expected.2);
     assert!(found.iter().map(|v| v.to_bits()).eq(expected.1), "values");
 }
@@ -354,7 +357,7 @@ fn large_stack(tree: *mut OlbvhTree, values: &[f32]) {
 /// Compares the owning calls with the Rust interface. With a reordered mesh the results are mapped back to the caller's
 /// numbers and differ only in the owners of shared faces, edges and vertices.
 pub fn owned(gpu: *mut OlbvhGpu) {
-    let device = &handle(gpu, "gpu").unwrap().0;
+    let device = &call!(handle(gpu, "gpu")).unwrap().0;
     let [mesh, other] = meshes();
     let settings = OlbvhPictureSettings { shading: 0, ..settings() };
     let prepare = |tree: &OlbvhTree, settings: &OlbvhPictureSettings| {
@@ -362,20 +365,21 @@ pub fn owned(gpu: *mut OlbvhGpu) {
         let (neighbours, field) =
             (tree.mesh.device.neighbours().unwrap(), Field { name: String::new(), on: On::Points, values: values(&mesh) });
         let valid = ValidTets { bounds, neighbours: &neighbours, is_valid: &|_| true };
-        Prepared::new(&settings.read().unwrap(), &mesh, &valid, &field).unwrap()
+        Prepared::new(&call!(settings.read()).unwrap(), &mesh, &valid, &field).unwrap()
     };
     let tree_of = |mesh: &Mesh, reorder: u32| -> *mut OlbvhTree {
         let (points, tets) = (mesh.points.as_ptr().cast(), mesh.tets.as_ptr().cast());
-        let held: *mut OlbvhMesh = made(|out| olbvh_mesh_upload(gpu, points, mesh.points.len(), tets, mesh.tets.len(), reorder, out));
-        let tree = made(|out| olbvh_tree_build(held, null(), out));
+        let held: *mut OlbvhMesh =
+            made(|out| call!(olbvh_mesh_upload(gpu, points, mesh.points.len(), tets, mesh.tets.len(), reorder, out)));
+        let tree = made(|out| call!(olbvh_tree_build(held, null(), out)));
         for level in [1, 4] {
             let options = OlbvhBuildOptions { level, ..olbvh_default_build_options() };
-            let other: *mut OlbvhTree = made(|out| olbvh_tree_build(held, &raw const options, out));
-            let info: OlbvhTreeInfo = made(|out| olbvh_tree_info(other, out));
+            let other: *mut OlbvhTree = made(|out| call!(olbvh_tree_build(held, &raw const options, out)));
+            let info: OlbvhTreeInfo = made(|out| call!(olbvh_tree_info(other, out)));
             assert_eq!(info.level, level);
-            olbvh_tree_free(other);
+            call!(olbvh_tree_free(other));
         }
-        olbvh_mesh_free(held);
+        call!(olbvh_mesh_free(held));
         tree
     };
     let middle = |t: &[u32; 4]| [0, 1, 2].map(|c| t.iter().map(|&v| mesh.points[v as usize][c] / 4.0).sum::<f32>());
@@ -386,27 +390,27 @@ pub fn owned(gpu: *mut OlbvhGpu) {
     for reorder in [0, 1] {
         let tree = tree_of(&mesh, reorder);
         let expected = first.get_or_insert_with(|| {
-            let Prepared { plan, .. } = prepare(handle(tree, "tree").unwrap(), &settings);
+            let Prepared { plan, .. } = prepare(call!(handle(tree, "tree")).unwrap(), &settings);
             expected(device, &[mesh.clone(), other.clone()], &plan, None)
         });
         let mut owners = vec![0; middles.len()];
-        ok(olbvh_locate(tree, middles.as_ptr().cast(), middles.len(), -1.0, owners.as_mut_ptr(), null_mut()));
+        ok(call!(olbvh_locate(tree, middles.as_ptr().cast(), middles.len(), -1.0, owners.as_mut_ptr(), null_mut())));
         assert!((0..).zip(&owners).all(|(tet, &owner)| tet == owner));
         let (count, wanted) = (mesh.points.len(), &expected.nearest);
         let (mut owners, mut places, mut distances) = (vec![0; count], vec![[0f32; 4]; count], vec![0f32; count]);
         let [to_places, to_distances] = [places.as_mut_ptr().cast(), distances.as_mut_ptr()];
-        ok(olbvh_nearest(tree, mesh.points.as_ptr().cast(), count, 1.0, owners.as_mut_ptr(), to_places, to_distances));
+        ok(call!(olbvh_nearest(tree, mesh.points.as_ptr().cast(), count, 1.0, owners.as_mut_ptr(), to_places, to_distances)));
         // In another order, equally near places are found in other tetrahedra.
         assert!(owners == wanted.owners && places == wanted.barycentrics || reorder == 1);
         assert!(distances.iter().zip(wanted.distances()).all(|(a, b)| (a - b).abs() < 1e-5 || a.is_nan() && b.is_nan()));
         let values = values(&mesh);
         let mut colors = vec![[0f32; 4]; 37 * 30];
-        ok(olbvh_render(tree, &raw const settings, values.as_ptr(), 0, colors.as_mut_ptr().cast()));
+        ok(call!(olbvh_render(tree, &raw const settings, values.as_ptr(), 0, colors.as_mut_ptr().cast())));
         let (mut answers, mut sliced) = (vec![0u32; 17 * 13 * 6], vec![0f32; 17 * 13 * 6]);
-        ok(olbvh_slice(tree, &raw const voxels, values.as_ptr(), 0, 1, answers.as_mut_ptr(), sliced.as_mut_ptr()));
+        ok(call!(olbvh_slice(tree, &raw const voxels, values.as_ptr(), 0, 1, answers.as_mut_ptr(), sliced.as_mut_ptr())));
         let mut hits = expected.hits.clone().map(|words| vec![u32::MAX; words.len()]);
         let [of_mesh, of_other] = &mut hits;
-        ok(olbvh_overlap(tree, other_tree, of_mesh.as_mut_ptr(), of_other.as_mut_ptr()));
+        ok(call!(olbvh_overlap(tree, other_tree, of_mesh.as_mut_ptr(), of_other.as_mut_ptr())));
         assert!(hits == expected.hits, "reorder {reorder}");
         let kinds = |answers: &[u32]| answers.iter().map(|&a| if a == u32::MAX { 2 } else { a >> 31 }).collect::<Vec<_>>();
         assert_eq!(kinds(&answers), kinds(&expected.answers), "reorder {reorder}");
@@ -419,16 +423,16 @@ pub fn owned(gpu: *mut OlbvhGpu) {
         if reorder == 0 {
             large_stack(tree, &values);
             let fresh = tree_of(&mesh, 0);
-            pictures(fresh, &values, &|settings| prepare(handle(fresh, "tree").unwrap(), settings));
-            olbvh_tree_free(fresh);
+            pictures(fresh, &values, &|settings| prepare(call!(handle(fresh, "tree")).unwrap(), settings));
+            call!(olbvh_tree_free(fresh));
         }
-        olbvh_tree_free(tree);
+        call!(olbvh_tree_free(tree));
     }
     let mut none = OlbvhPictureSettings { iso_count: 9, ..settings };
-    assert_eq!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut()), OlbvhStatus::Invalid);
+    assert_eq!(call!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut())), OlbvhStatus::Invalid);
     assert!(message().contains("9 iso-surfaces"), "{}", message());
     none = OlbvhPictureSettings { camera: c"nowhere".as_ptr(), ..settings };
-    assert_eq!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut()), OlbvhStatus::Invalid);
+    assert_eq!(call!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut())), OlbvhStatus::Invalid);
     assert!(message().contains("nowhere"), "{}", message());
-    olbvh_tree_free(other_tree);
+    call!(olbvh_tree_free(other_tree));
 }
