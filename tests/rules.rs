@@ -23,17 +23,17 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("reference", &["error", "grid", "layout", "mesh", "options", "render", "slicing", "times", "tree"]),
     ("formats", &["error", "grid", "mesh", "named"]),
     ("gpu", &["error", "kernels", "named", "primitives", "times"]),
-    ("kernels", &["error", "gpu", "named"]),
+    ("kernels", &["gpu"]),
     ("primitives", &["error", "gpu", "kernels"]),
     ("build", &["error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "reference", "times", "tree"]),
     ("glsl", &["build", "error", "gpu", "layout", "options"]),
     ("query", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing", "times"]),
     ("blocks", &["build", "error", "gpu", "grid", "layout", "mesh", "options", "query", "reference", "render", "slicing", "times"]),
     ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "named", "primitives", "query", "reference", "render", "slicing", "times"]),
-    ("conformance", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing", "tree"]),
+    ("conformance", &["build", "error", "gpu", "grid", "layout", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing", "tree"]),
     ("capi", &["build", "error", "glsl", "gpu", "grid", "layout", "mesh", "options", "query", "reference", "render", "slicing"]),
-    ("bench", &["baseline", "build", "error", "gpu", "grid", "kernels", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing", "times", "tree"]),
-    ("tune", &["bench", "build", "error", "formats", "gpu", "kernels", "mesh", "options", "query", "reference", "render", "slicing", "times", "tree"]),
+    ("bench", &["baseline", "build", "error", "gpu", "grid", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing", "times", "tree"]),
+    ("tune", &["bench", "build", "error", "formats", "gpu", "mesh", "options", "query", "reference", "render", "slicing", "times", "tree"]),
 ];
 
 /// `kernels` contains what is generated for the pipelines of `gpu`, and `gpu` runs the self-test of `primitives` before

@@ -163,10 +163,10 @@ impl Assembly {
         let fields = self.fields(&used);
         if self.straightened > 0 {
             let n = self.straightened;
-            let remedy = if self.has_quadratic && self.curved == Curved::Corners {
-                "; --curved split (Curved::Split) uses all nodes of quadratic ones"
-            } else {
-                ""
+            let remedy = match (self.has_quadratic, self.curved) {
+                (true, Curved::Corners) => "; --curved split (Curved::Split) uses all nodes of quadratic ones",
+                (true, Curved::Split) => "; the nodes of quadratic ones among them lie far from the middles of their edges",
+                _ => "",
             };
             self.warnings.push(format!(
                 "{n} cells of higher order are taken by their corners: their edges are straight, and fields are linear in them{remedy}"

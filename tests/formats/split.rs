@@ -269,6 +269,99 @@ fn quadratic_cells_fit_each_other() {
     }
 }
 
+/// Corners of a cell of one of four quadratic kinds, and what its other nodes are in the middle of.
+fn nodes_of(kind: u8) -> (Vec<[f64; 3]>, Vec<Vec<usize>>) {
+    let cube = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0., 0., 1.], [1., 0., 1.], [1., 1., 1.], [0., 1., 1.]];
+    let ring = |n: usize| (0..2 * n).map(move |i| vec![i, i / n * n + (i + 1) % n]).chain((0..n).map(move |i| vec![i, i + n]));
+    let quads = |n: usize| (0..n).map(move |i| vec![i, (i + 1) % n, (i + 1) % n + n, i + n]);
+    let wedge = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 0., 1.], [1., 0., 1.], [1., 1., 1.]];
+    match kind {
+        25 => (cube.to_vec(), ring(4).collect()),
+        29 => (cube.to_vec(), ring(4).chain(quads(4)).chain([vec![0, 1, 2, 3], vec![4, 5, 6, 7], (0..8).collect()]).collect()),
+        26 => (wedge.to_vec(), ring(3).collect()),
+        _ => (wedge.to_vec(), ring(3).chain(quads(3)).collect()),
+    }
+}
+
+/// Thin curved layers around a cylinder, whose nodes are nearer to the middles of other edges and faces than their own:
+/// every node counts, the pieces fit, and their volume is that of the layers but for what chords cut off.
+#[test]
+fn nodes_of_thin_curved_layers_keep_their_edges() {
+    const N: usize = 32;
+    let radii: [f64; 3] = [1.0, 1.005, 1.3];
+    for kind in [25, 29, 26, 32] {
+        let (corners, middles) = nodes_of(kind);
+        let mean = |middle: &Vec<usize>| [0, 1, 2].map(|c| middle.iter().map(|&i| corners[i][c]).sum::<f64>() / middle.len() as f64);
+        let nodes: Vec<[f64; 3]> = corners.iter().copied().chain(middles.iter().map(mean)).collect();
+        // Wedges fill a cube in twos.
+        let turned = |p: [f64; 3]| if p[0] >= p[1] { [p[1], p[0], p[2]] } else { p };
+        let parts = if corners.len() == 6 { vec![nodes.clone(), nodes.iter().map(|&p| turned(p)).collect()] } else { vec![nodes] };
+        let (mut numbers, mut points, mut cells) = (HashMap::new(), Vec::new(), Vec::new());
+        for (layer, sector) in (0..2).flat_map(|layer| (0..N).map(move |sector| (layer, sector))) {
+            for nodes in &parts {
+                cells.push(Vec::new());
+                for &[u, v, w] in nodes {
+                    let [v, w] = if corners.len() == 6 { [w, v] } else { [v, w] }; // layers of wedges have triangles at the cylinder
+                    let (r, turn) = (radii[layer] + (radii[layer + 1] - radii[layer]) * v, (sector as f64 + u) / N as f64 % 1.0);
+                    let key = [(r * 1e6).round() as i64, (turn * 1e6).round() as i64, (w * 2.0) as i64];
+                    let number = *numbers.entry(key).or_insert_with(|| {
+                        let (sin, cos) = (turn * std::f64::consts::TAU).sin_cos();
+                        points.push([r * cos, r * sin, 0.3 * w]);
+                        points.len() - 1
+                    });
+                    cells.last_mut().unwrap().push(number);
+                }
+            }
+        }
+        let text = file(&points, &cells, &vec![kind; cells.len()]);
+        let options = LoadOptions { curved: Curved::Split, ..LoadOptions::default() };
+        let Loaded { mesh, report } = load_bytes("ring.vtk", text.into_bytes(), &options).unwrap();
+        assert!(report.count(Fate::Straightened) == 0 && report.warnings.is_empty() && report.unused_points == 0, "{kind}: {report}");
+        assert!(mesh.tets.iter().all(|&t| volume(&mesh, t) > 0.0), "{kind}");
+        // The chords are those of twice as many sectors.
+        let part = (std::f64::consts::PI / N as f64).sin() / (std::f64::consts::PI / N as f64);
+        let wanted = 0.3 * std::f64::consts::PI * (radii[2] * radii[2] - radii[0] * radii[0]) * part;
+        let total: f64 = mesh.tets.iter().map(|&t| volume(&mesh, t)).sum();
+        assert!((total / wanted - 1.0).abs() < 2e-5, "{kind}: {total} {wanted}");
+        let boundary = faces(&mesh).values().filter(|&&n| n == 1).count();
+        assert!(faces(&mesh).values().all(|&n| n <= 2) && boundary % (2 * N) == 0, "{kind}: {boundary}");
+    }
+}
+
+/// A wedge of 18 nodes in which one of a quadrilateral lies nearest to the middle of a triangle, where none can be.
+#[test]
+fn nodes_of_a_wedge_are_not_in_its_triangles() {
+    let at = |p: &str| -> [f64; 3] { p.split(' ').map(|x| x.parse().unwrap()).collect::<Vec<_>>().try_into().unwrap() };
+    let points = [
+        "1.021168 1.15 .15",
+        ".021168 1.15 0",
+        "1 .15 .15",
+        "1.021168 .937578 1.15",
+        ".021168 .937578 1",
+        "1 -.062422 1.15",
+        ".521168 1.15 .0375",
+        ".649624 .65 .0375",
+        "1.149624 .65 .15",
+        ".521168 .937578 1.0375",
+        ".649624 .437578 1.0375",
+        "1.149624 .437578 1.15",
+        "1.021168 1.081045 .65",
+        ".021168 1.081045 .5",
+        "1 .081045 .65",
+        ".521168 1.081045 .5375",
+        ".649624 .581045 .5375",
+        "1.149624 .581045 .65",
+    ]
+    .map(at);
+    let text = file(&points, &[(0..18).collect()], &[32]);
+    let options = LoadOptions { curved: Curved::Split, ..LoadOptions::default() };
+    let Loaded { mesh, report } = load_bytes("wedge.vtk", text.into_bytes(), &options).unwrap();
+    assert_eq!((mesh.tets.len(), report.count(Fate::Split), report.tangled), (32, 1, 0), "{report}");
+    // VTK's volume of the cell, less what its curved faces have beyond their triangles.
+    let total: f64 = mesh.tets.iter().map(|&t| volume(&mesh, t)).sum();
+    assert!((total - 0.50179).abs() < 0.004, "{total}");
+}
+
 /// The volume of a box of 2.5 × 1 × 1 whose own tetrahedra are folded at 16 faces, so that a little of it is counted
 /// twice.
 const MIXED: f64 = 2.501_392_23;
