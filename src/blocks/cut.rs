@@ -83,10 +83,11 @@ impl<'a> Source<'a> {
         Ok(Self { mesh, grid, options, level: wanted, wanted, topology, vertices, crowded })
     }
 
-    /// The same mesh, with trees of the finest level, up to the one wanted, that suits `memory` bytes: the marks of
-    /// cells take at most an eighth of them, and a block of the [`LEAST`] largest tetrahedra at most half. On a finer
+    /// The same mesh, with trees of the finest level, up to the one wanted, that suits the memory limit: the marks of
+    /// cells take at most an eighth of it, and a block of the [`LEAST`] largest tetrahedra at most half. On a finer
     /// level, these would have too many candidates for any block with them to fit.
-    pub(super) fn within(&self, gpu: &Gpu, memory: u64) -> Result<Self> {
+    pub(super) fn within(&self, gpu: &Gpu) -> Result<Self> {
+        let memory = gpu.memory_limit();
         let at = |level: u32| BuildOptions { level: Some(level), ..self.options };
         let marks_fit = |level: u32| self.options.lists == Lists::All || 8u64.pow(level) / 8 <= memory / 8;
         let mut level = self.wanted;
@@ -109,10 +110,10 @@ impl<'a> Source<'a> {
         Size { points: counts.len() as u32, tets: counts.len(), candidates, entries: candidates, leaves: candidates.min(8u64.pow(level)) }
     }
 
-    /// Whether `memory` bytes suffice for blocks that leave `beside` bytes of it unused, with cuts that `may` allows
+    /// Whether the memory limit suffices for blocks that leave `beside` bytes of it unused, with cuts that `may` allows
     /// (see [`Self::cut_in_two`]).
-    pub(super) fn fits_in_blocks(&self, gpu: &Gpu, memory: u64, beside: u64, may: May<'_>) -> Result<bool> {
-        let (source, most) = (self.within(gpu, memory)?, memory.saturating_sub(beside));
+    pub(super) fn fits_in_blocks(&self, gpu: &Gpu, beside: u64, may: May<'_>) -> Result<bool> {
+        let (source, most) = (self.within(gpu)?, gpu.memory_limit().saturating_sub(beside));
         let mut waiting = vec![source.whole()];
         while let Some(block) = waiting.pop() {
             let need = block.bytes(gpu, &source.options)?;

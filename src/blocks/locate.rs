@@ -30,15 +30,14 @@ pub struct LocateRequest<'a> {
     pub points: &'a [[f32; 3]],
 }
 
-/// Finds the owner of each point, as [`query::locate`] does, within `memory` bytes of device memory. `report` receives
-/// the number of points done, and of all.
+/// Finds the owner of each point, as [`query::locate`] does, within the memory limit of `gpu`. `report` receives the
+/// number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`query::locate`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is
 /// too small for the smallest blocks, or for 2^32 points and more.
 pub fn locate(
     gpu: &Gpu,
-    memory: u64,
     asked: &LocateRequest<'_>,
     field: Option<(&[f32], On)>,
     how: &LocateOptions,
@@ -49,7 +48,7 @@ pub fn locate(
     let nan = f32::from_bits(0x7fc0_0000);
     let values = vec![nan; if field.is_some() { n } else { 0 }];
     let mut all = Located { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], values, times: StageTimes::default() };
-    let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
+    let took = each(gpu, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
         let here = field.map(|(values, on)| (placed.values(values, on), on));
         let here = here.as_ref().map(|(values, on)| (&values[..], *on));
         let found = query::locate(&placed.tree, points, here, how, SILENT)?;
@@ -65,14 +64,14 @@ pub fn locate(
     Ok(took.with(all))
 }
 
-/// Finds every tetrahedron that contains each point, as [`query::locate_all`] does, within `memory` bytes of device
-/// memory. `report` receives the number of points done, and of all.
+/// Finds every tetrahedron that contains each point, as [`query::locate_all`] does, within the memory limit of `gpu`.
+/// `report` receives the number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`locate`].
-pub fn locate_all(gpu: &Gpu, memory: u64, asked: &LocateRequest<'_>, tolerance: f32, report: Progress<'_>) -> Result<InBlocks<AllOwners>> {
+pub fn locate_all(gpu: &Gpu, asked: &LocateRequest<'_>, tolerance: f32, report: Progress<'_>) -> Result<InBlocks<AllOwners>> {
     let mut all = AllOwners { owners: vec![Vec::new(); asked.points.len()], ..AllOwners::default() };
-    let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
+    let took = each(gpu, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
         let found = query::locate_all(&placed.tree, points, tolerance, SILENT)?;
         for (&i, owners) in ids.iter().zip(found.owners) {
             all.owners[i as usize] = owners.into_iter().map(|t| placed.tet(t)).collect();
@@ -97,19 +96,11 @@ pub(super) enum Blocks {
 }
 
 /// Queries the whole mesh, if it fits, or one block after another.
-pub(super) fn each(
-    gpu: &Gpu,
-    memory: u64,
-    asked: &LocateRequest<'_>,
-    blocks: Blocks,
-    report: Progress<'_>,
-    ask: Ask<'_>,
-) -> Result<InBlocks> {
+pub(super) fn each(gpu: &Gpu, asked: &LocateRequest<'_>, blocks: Blocks, report: Progress<'_>, ask: Ask<'_>) -> Result<InBlocks> {
     let LocateRequest { mesh, ref options, points } = *asked;
-    let gpu = &gpu.with_memory(memory);
     let all: Vec<u32> = (0..numbered(points.len())?).collect();
     let mut job = Job { gpu, points, done: 0.0, told: 0, took: InBlocks::default(), ask, report };
-    if least_bytes(gpu, mesh, options)? <= memory {
+    if least_bytes(gpu, mesh, options)? <= gpu.memory_limit() {
         let whole = job.took.place(gpu, mesh, options, 0);
         let answered = unless_too_large(whole.and_then(|placed| job.ask(&placed, None, &all, 1.0)))?;
         if answered.is_some() {
@@ -117,7 +108,7 @@ pub(super) fn each(
         }
         job.done = 0.0;
     }
-    let source = Source::new(mesh, options)?.within(gpu, memory)?;
+    let source = Source::new(mesh, options)?.within(gpu)?;
     job.took.bad_cells[0] = source.bad_cells();
     // The other points lie so far outside that they have no cell.
     let near: Vec<u32> = all.into_iter().filter(|&i| place(&source.grid, points[i as usize]).is_some()).collect();
@@ -130,13 +121,13 @@ pub(super) fn each(
         }
         let before = job.done;
         let need = block.bytes(gpu, &source.options)?;
-        let tried = try_block(need, memory, || {
+        let tried = try_block(gpu, need, || {
             let placed = job.took.build(|| block.place(gpu, &source))?;
             job.ask(&placed, Some(block.cells.finest(source.level)), &ids, share)
         })?;
         let Tried::TooLarge(why) = tried else { continue };
         job.done = before;
-        let Some([low, high]) = smaller(&source, &block, pieces(need, memory), ANYWHERE) else {
+        let Some([low, high]) = smaller(&source, &block, pieces(need, gpu.memory_limit()), ANYWHERE) else {
             let beside = PER_POINT * FEW.min(ids.len()) as u64;
             let refused = Refused { gpu, sources: from_ref(&source), beside, may: ANYWHERE };
             return Err(refused.error(block.tets.len(), need, why));

@@ -1,5 +1,5 @@
 //! Meshes that do not fit the device's memory, processed in blocks: these are built, queried and dropped one after
-//! another, each within a given number of bytes.
+//! another, each within the memory limit of the given handle.
 //!
 //! Each block is a box of octree cells on the tree's level; a box is cut in two by numbers of tetrahedra. A block
 //! contains its *core*, which is every tetrahedron whose quantized box meets these cells, and the tetrahedra that share
@@ -19,7 +19,7 @@
 //! Memory and limits:
 //! - A mesh that fits is not cut. Whether a block fits is first estimated; a block that turns out to be larger is
 //!   abandoned and cut again.
-//! - The limit is enforced by [`Gpu::with_memory`], which counts every buffer, transfer buffers included.
+//! - The limit is that of the handle ([`Gpu::with_memory`]), which counts every buffer, transfer buffers included.
 //! - The mesh itself is in host memory as a whole, with an additional 6 bytes per point and 4 per tetrahedron.
 //!   Rendering adds normals (12 bytes per point), rays (52 bytes each), and at the start neighbours (16 bytes per
 //!   tetrahedron, and about three times that while they are matched).
@@ -57,7 +57,7 @@ pub struct InBlocks<T = ()> {
     pub answer: T,
     /// Number of trees built for it; 1 per mesh if that fitted as a whole.
     pub trees: u32,
-    /// The most bytes of device memory in use simultaneously.
+    /// The most bytes that buffers of the given handle took simultaneously.
     pub peak: u64,
     /// Seconds spent on building trees, transfers included.
     pub build_seconds: f64,
@@ -116,9 +116,9 @@ enum Tried {
     TooLarge(Option<Error>),
 }
 
-/// Does the work on a block that takes about `need` bytes, if there are as many.
-fn try_block(need: u64, memory: u64, work: impl FnOnce() -> Result<()>) -> Result<Tried> {
-    if need > memory {
+/// Does the work on a block that takes about `need` bytes, if the limit allows as many.
+fn try_block(gpu: &Gpu, need: u64, work: impl FnOnce() -> Result<()>) -> Result<Tried> {
+    if need > gpu.memory_limit() {
         return Ok(Tried::TooLarge(None));
     }
     match work() {
@@ -190,12 +190,13 @@ impl Refused<'_, '_> {
     /// An amount of memory above `least` in which all blocks fit: the first of a sequence that grows by half.
     fn enough(&self, least: u64) -> Option<u64> {
         const UNIT: u64 = 1 << 16;
+        const MOST: u64 = 1 << 50;
         let n = self.sources.len() as u64;
-        let fits = |memory: &u64| {
-            self.sources.iter().all(|source| source.fits_in_blocks(self.gpu, memory / n, self.beside / n, self.may).unwrap_or(false))
+        let fits = |source: &Source<'_>, memory: u64| {
+            source.fits_in_blocks(&self.gpu.with_memory(memory), self.beside / n, self.may).unwrap_or(false)
         };
-        let next = |memory: &u64| Some((memory / 2 * 3).next_multiple_of(UNIT)).filter(|&more| more < 1 << 50);
-        std::iter::successors(next(&least), next).find(fits)
+        let next = |memory: &u64| Some((memory.min(&MOST) / 2 * 3).next_multiple_of(UNIT)).filter(|more| more < &MOST);
+        std::iter::successors(next(&least), next).find(|memory| self.sources.iter().all(|source| fits(source, memory / n)))
     }
 }
 

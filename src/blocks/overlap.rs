@@ -53,17 +53,16 @@ pub struct OverlapRequest<'a> {
     pub pairs: bool,
 }
 
-/// Computes the overlap of A and B, as [`query::overlap`] does, within `memory` bytes of device memory. Pairs that are
-/// nearer to touching than 1e-6 of the scene's diagonal may be counted or not, depending on the blocks. The reported
-/// effort is the sum over all pairs of blocks. `report` receives how many millionths of the work are done, and a
+/// Computes the overlap of A and B, as [`query::overlap`] does, within the memory limit of `gpu`. Pairs that are nearer
+/// to touching than 1e-6 of the scene's diagonal may be counted or not, depending on the blocks. The reported effort is
+/// the sum over all pairs of blocks. `report` receives how many millionths of the work are done, and a
 /// million.
 ///
 /// # Errors
 /// Those of [`query::overlap`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the
 /// memory is too small for the smallest blocks.
-pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progress<'_>) -> Result<InBlocks<Overlapped>> {
+pub fn overlap(gpu: &Gpu, asked: &OverlapRequest<'_>, report: Progress<'_>) -> Result<InBlocks<Overlapped>> {
     let OverlapRequest { meshes, ref options, pairs } = *asked;
-    let gpu = &gpu.with_memory(memory);
     let mut took = InBlocks::default();
     // If the whole turns out not to fit, the progress stays where it is until the blocks have come as far.
     let told = Cell::new(0);
@@ -73,7 +72,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progr
     };
     // The second construction can use the scratch memory of the first one again. What it adds, the second mesh itself,
     // is half of what it takes at the least.
-    if least_bytes(gpu, meshes[0], options)?.saturating_add(least_bytes(gpu, meshes[1], options)? / 2) <= memory {
+    if least_bytes(gpu, meshes[0], options)?.saturating_add(least_bytes(gpu, meshes[1], options)? / 2) <= gpu.memory_limit() {
         let found = took.place(gpu, meshes[0], options, 0).and_then(|a| {
             let b = took.place(gpu, meshes[1], options, 1)?;
             query::overlap(&a.tree, &b.tree, pairs, &|done, all| tell(done as f64 / all.max(1) as f64))
@@ -83,7 +82,8 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progr
             return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(found));
         }
     }
-    let [a, b] = meshes.map(|mesh| Source::new(mesh, options)?.within(gpu, memory / 2));
+    let half = &gpu.with_memory(gpu.memory_limit() / 2);
+    let [a, b] = meshes.map(|mesh| Source::new(mesh, options)?.within(half));
     let sources = [a?, b?];
     took.bad_cells = sources.each_ref().map(Source::bad_cells);
     let apart = APART * sources.iter().map(Source::extent).sum::<f64>();
@@ -101,7 +101,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progr
         for (node, source) in nodes.iter().zip(&sources) {
             need = need.saturating_add(node.block.bytes(gpu, &source.options)?);
         }
-        let tried = try_block(need, memory, || {
+        let tried = try_block(gpu, need, || {
             merge(&mut all, visit(gpu, &sources, &nodes, &mut placed, pairs, &mut took)?);
             Ok(())
         })?;

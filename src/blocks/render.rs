@@ -45,24 +45,23 @@ pub struct Picture {
     pub prepared: Prepared,
 }
 
-/// Renders a picture as [`query::render`] does, within `memory` bytes of device memory. `report` receives the number of
-/// rays done and of all; for a mesh in blocks, how many millionths of the work are done, and a million.
+/// Renders a picture as [`query::render`] does, within the memory limit of `gpu`. `report` receives the number of rays
+/// done and of all; for a mesh in blocks, how many millionths of the work are done, and a million.
 ///
 /// # Errors
 /// Those of [`query::render`], [`Prepared::new`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the
 /// sizes if the memory is too small for the smallest blocks.
-pub fn render(gpu: &Gpu, memory: u64, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<InBlocks<Picture>> {
+pub fn render(gpu: &Gpu, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<InBlocks<Picture>> {
     let RenderRequest { mesh, ref options, field, settings } = *asked;
     check_field(mesh, Some((&field.values, field.on)))?;
-    let gpu = &gpu.with_memory(memory);
     let mut took = InBlocks::default();
-    if least_bytes(gpu, mesh, options)? <= memory {
+    if least_bytes(gpu, mesh, options)? <= gpu.memory_limit() {
         let placed = took.place(gpu, mesh, options, 0);
         if let Some(picture) = unless_too_large(placed.and_then(|placed| render_whole(&placed, asked, report)))? {
             return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(picture));
         }
     }
-    let source = Source::new(mesh, options)?.within(gpu, memory)?;
+    let source = Source::new(mesh, options)?.within(gpu)?;
     took.bad_cells[0] = source.bad_cells();
     // Light and opacity of a volume depend on which points are on the mesh surface; those of iso-surfaces do not.
     let neighbours = if settings.iso.is_empty() { source.neighbours() } else { Vec::new() };
@@ -72,7 +71,7 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &RenderRequest<'_>, report: Progres
     let mut rays = Rays::new(prepared.plan.size)?;
     let order = Order::new(&prepared.plan, &source.grid);
     let (stats, times) = (RenderStats::default(), StageTimes::default());
-    let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, order, stats, times, took };
+    let mut job = Job { gpu, source: &source, field, prepared: &prepared, order, stats, times, took };
     let mut waiting = vec![(source.whole(), 1.0)];
     let mut done = 0.0;
     while let Some((block, share)) = waiting.pop() {
@@ -99,7 +98,6 @@ fn render_whole(placed: &Placed, asked: &RenderRequest<'_>, report: Progress<'_>
 /// The state of rendering a picture in blocks.
 struct Job<'a> {
     gpu: &'a Gpu,
-    memory: u64,
     source: &'a Source<'a>,
     field: &'a Field,
     prepared: &'a Prepared,
@@ -118,9 +116,9 @@ impl Job<'_> {
             return Ok(None);
         }
         let need = block.bytes(self.gpu, &self.source.options)?;
-        let Tried::TooLarge(why) = try_block(need, self.memory, || self.draw(block, &met, rays))? else { return Ok(None) };
+        let Tried::TooLarge(why) = try_block(self.gpu, need, || self.draw(block, &met, rays))? else { return Ok(None) };
         let may = |axis: usize, last: u32| self.order.low_first(axis, last).is_some();
-        let Some([low, high]) = smaller(self.source, block, pieces(need, self.memory), &may) else {
+        let Some([low, high]) = smaller(self.source, block, pieces(need, self.gpu.memory_limit()), &may) else {
             let beside = RESERVE + PER_COLUMN * u64::from(self.prepared.plan.size[0]);
             let refused = Refused { gpu: self.gpu, sources: from_ref(self.source), beside, may: &may };
             return Err(refused.error(block.tets.len(), need, why));

@@ -42,7 +42,7 @@ pub struct SliceRequest<'a> {
     pub extrapolate: Extrapolate,
 }
 
-/// Slices a mesh as [`query::slice`] does, within `memory` bytes of device memory. Passes the voxels to `sink` band by
+/// Slices a mesh as [`query::slice`] does, within the memory limit of `gpu`. Passes the voxels to `sink` band by
 /// band, in order. `report` receives the number of voxels done, and of all.
 ///
 /// # Errors
@@ -50,7 +50,6 @@ pub struct SliceRequest<'a> {
 /// is too small for the smallest blocks.
 pub fn slice(
     gpu: &Gpu,
-    memory: u64,
     asked: &SliceRequest<'_>,
     report: Progress<'_>,
     sink: &mut dyn FnMut(Band) -> Result<()>,
@@ -58,7 +57,6 @@ pub fn slice(
     let SliceRequest { mesh, ref options, field, voxels, extrapolate } = *asked;
     let values = field.map(|f| (f.values.as_slice(), f.on));
     check_field(mesh, values)?;
-    let gpu = &gpu.with_memory(memory);
     let mut took = InBlocks::default();
     let tally = Cell::new(Tally::default());
     let mut sink = |band: Band| {
@@ -67,7 +65,7 @@ pub fn slice(
         tally.set(sum);
         sink(band)
     };
-    if least_bytes(gpu, mesh, options)? <= memory {
+    if least_bytes(gpu, mesh, options)? <= gpu.memory_limit() {
         let whole = took.place(gpu, mesh, options, 0);
         let sliced = whole.and_then(|Placed { tree, .. }| query::slice(&tree, values, voxels, extrapolate, report, &mut sink));
         // Once the sink has voxels, it is too late to begin again.
@@ -76,11 +74,11 @@ pub fn slice(
             return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(sliced));
         }
     }
-    let source = Source::new(mesh, options)?.within(gpu, memory)?;
+    let source = Source::new(mesh, options)?.within(gpu)?;
     took.bad_cells[0] = source.bad_cells();
     voxels.check_over(&source.grid)?;
     let (blocks, times) = (vec![source.whole()], StageTimes::default());
-    let mut job = Job { gpu, memory, asked, source: &source, blocks, placed: None, took, times, done: 0.0, report };
+    let mut job = Job { gpu, asked, source: &source, blocks, placed: None, took, times, done: 0.0, report };
     for rows in bands(voxels, BATCH) {
         sink(job.batch(rows)?)?;
     }
@@ -91,7 +89,6 @@ pub fn slice(
 /// The state of slicing a stack in blocks.
 struct Job<'a> {
     gpu: &'a Gpu,
-    memory: u64,
     asked: &'a SliceRequest<'a>,
     source: &'a Source<'a>,
     /// The blocks that the mesh is cut into so far; the last one may be in device memory.
@@ -121,14 +118,14 @@ impl Job<'_> {
         while let Some((block, share)) = waiting.pop() {
             let met = block.bounds(self.source).is_some_and(|bounds| voxels.meets(rows, bounds, &self.source.grid));
             let need = block.bytes(self.gpu, &self.source.options)?;
-            let tried = if met { try_block(need, self.memory, || self.visit(&block, &mut all))? } else { Tried::Done };
+            let tried = if met { try_block(self.gpu, need, || self.visit(&block, &mut all))? } else { Tried::Done };
             let Tried::TooLarge(why) = tried else {
                 self.done += share;
                 (self.report)(self.done as u64, voxels.voxels())?;
                 self.blocks.push(block);
                 continue;
             };
-            let Some([low, high]) = smaller(self.source, &block, pieces(need, self.memory), ANYWHERE) else {
+            let Some([low, high]) = smaller(self.source, &block, pieces(need, self.gpu.memory_limit()), ANYWHERE) else {
                 let beside = RESERVE + PER_ROW_VOXEL * u64::from(voxels.size[0]);
                 let refused = Refused { gpu: self.gpu, sources: from_ref(self.source), beside, may: ANYWHERE };
                 return Err(refused.error(block.tets.len(), need, why));

@@ -94,7 +94,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
     let output = ResultOutput::announce(&args.output, formats, &[&args.mesh, &args.points], common)?;
     let options = args.tree.suited(Fineness::Points)?;
-    let engine = engine::open(common)?;
+    let engine = engine::open(common, args.memory.memory)?;
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;
     let mesh = &loaded.mesh;
@@ -107,15 +107,15 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let how = LocateOptions { method, tolerance: args.tolerance };
     let progress = Progress::new(common, "locating");
     let report = |done: u64, total: u64| progress.follow(done, total);
-    let (start, memory) = (Instant::now(), args.memory.memory);
+    let start = Instant::now();
     let (found, beside, took, seconds) = if args.all {
-        let (all, took) = engine.locate_all(&asked, args.tolerance, memory, &report)?.into_parts();
+        let (all, took) = engine.locate_all(&asked, args.tolerance, &report)?.into_parts();
         let seconds = start.elapsed().as_secs_f64();
         (write_every_owner(&output, mesh, &all.owners)?, 0, took, seconds)
     } else {
-        let (mut located, took) = engine.locate(&asked, &how, memory, &report)?.into_parts();
+        let (mut located, took) = engine.locate(&asked, &how, &report)?.into_parts();
         let found = with_owner(&located);
-        let distances = args.within.map(|within| move_beside(&*engine, &asked, &mut located, within, memory, &report)).transpose()?;
+        let distances = args.within.map(|within| move_beside(&*engine, &asked, &mut located, within, &report)).transpose()?;
         let values = columns(mesh, &fields, args.all_fields, &located, distances);
         let seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.owners.iter().map(|&tet| if tet == u32::MAX { tet } else { mesh.cell_id(tet) }).collect();
@@ -239,7 +239,6 @@ fn move_beside(
     asked: &LocateRequest<'_>,
     located: &mut query::Located,
     within: f32,
-    memory: Option<u64>,
     report: OnProgress<'_>,
 ) -> Outcome<Vec<f32>> {
     let outside: Vec<usize> = (0..located.owners.len()).filter(|&i| located.owners[i] == u32::MAX).collect();
@@ -248,7 +247,7 @@ fn move_beside(
     if points.is_empty() {
         return Ok(distances);
     }
-    let (nearest, _) = engine.nearest(&LocateRequest { points: &points, ..*asked }, within, memory, report)?.into_parts();
+    let (nearest, _) = engine.nearest(&LocateRequest { points: &points, ..*asked }, within, report)?.into_parts();
     for (k, (&i, distance)) in outside.iter().zip(nearest.distances()).enumerate() {
         (located.owners[i], located.barycentrics[i], distances[i]) = (nearest.owners[k], nearest.barycentrics[k], distance);
     }

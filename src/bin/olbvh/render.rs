@@ -137,7 +137,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let legend = args.legend()?;
     let mut settings = args.settings(legend.as_ref())?;
     settings.check()?;
-    let engine = engine::open(common)?;
+    let engine = engine::open(common, args.memory.memory)?;
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;
     let mesh = &loaded.mesh;
@@ -151,7 +151,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let start = Instant::now();
     let progress = Progress::new(common, "rendering");
     let asked = RenderRequest { mesh, options, field: &field, settings: &settings };
-    let (mut picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.follow(done, total))?.into_parts();
+    let (mut picture, took) = engine.render(&asked, &|done, total| progress.follow(done, total))?.into_parts();
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
     if expects_something && picture.rendered.colors.iter().all(|color| color[3] < FAINT) {

@@ -109,7 +109,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = args.format()?;
     let colors = input::transfer(args.tf.as_deref().unwrap_or(DEFAULT_MAP))?;
     let options = BuildOptions { slabs: true, ..args.tree.suited(Fineness::Points)? };
-    let engine = engine::open(common)?;
+    let engine = engine::open(common, args.memory.memory)?;
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;
     let mesh = &loaded.mesh;
@@ -130,7 +130,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let start = Instant::now();
     let mut sink = |band: Band| layers.band(band);
     let asked = SliceRequest { mesh, options, field, voxels: &voxels, extrapolate: args.extrapolate };
-    let sliced = engine.slice(&asked, args.memory.memory, &|done, total| progress.follow(done, total), &mut sink)?;
+    let sliced = engine.slice(&asked, &|done, total| progress.follow(done, total), &mut sink)?;
     let (Sliced { tally, .. }, took) = sliced.into_parts();
     layers.finish()?;
     drop(progress);
