@@ -33,29 +33,23 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|v| v.to_bits()).collect()
 }
 
-fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance, method, on): (f32, LocateMethod, On)) -> u32 {
+fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, how: LocateOptions) {
     let points = points(mesh, 3);
-    let how = LocateOptions { tolerance, method };
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(gpu, &device, options).unwrap();
     let asked = LocateRequest { mesh, options: *options, points: &points };
-    let mut most = 0;
-    for field in mesh.fields.iter().filter(|f| f.on == on) {
-        let field = (&field.values[..], field.on);
-        let whole = query::locate(&tree, &points, Some(field), &how, SILENT).unwrap();
-        let found = locate(&gpu.with_memory(memory), &asked, Some(field), &how, SILENT).unwrap();
-        let first = (0..points.len()).find(|&i| found.answer.owners[i] != whole.owners[i]);
-        let first = first.map(|i| (points[i], found.answer.owners[i], whole.owners[i]));
-        assert_eq!(first, None, "{options:?}");
-        assert_eq!(bits(found.answer.barycentrics.as_flattened()), bits(whole.barycentrics.as_flattened()));
-        assert_eq!(bits(&found.answer.values), bits(&whole.values));
-        assert!(found.peak <= memory && found.peak > memory / 4, "{} of {memory} bytes", found.peak);
-        assert!(found.bad_cells == [device.status().bad, 0] && found.bad_cells[0] > 0, "{:?}", found.bad_cells);
-        println!("{} tetrahedra, {memory} bytes: {} trees, peak {}", mesh.tets.len(), found.trees, found.peak);
-        most = most.max(found.trees);
-    }
+    let whole = query::locate(&tree, &points, None, &how, SILENT).unwrap();
+    let found = locate(&gpu.with_memory(memory), &asked, &how, SILENT).unwrap();
+    let first = (0..points.len()).find(|&i| found.answer.owners[i] != whole.owners[i]);
+    let first = first.map(|i| (points[i], found.answer.owners[i], whole.owners[i]));
+    assert_eq!(first, None, "{options:?}");
+    assert_eq!(bits(found.answer.barycentrics.as_flattened()), bits(whole.barycentrics.as_flattened()));
+    assert!(found.peak <= memory && found.peak > memory / 4, "{} of {memory} bytes", found.peak);
+    assert!(found.bad_cells == [device.status().bad, 0] && found.bad_cells[0] > 0, "{:?}", found.bad_cells);
+    assert!(found.trees > 4, "{} trees", found.trees);
+    println!("{} tetrahedra, {memory} bytes: {} trees, peak {}", mesh.tets.len(), found.trees, found.peak);
     let whole = query::locate_all(&tree, &points, how.tolerance, SILENT).unwrap();
-    assert_eq!(locate_all(&gpu.with_memory(memory), &asked, tolerance, SILENT).unwrap().answer.owners, whole.owners);
+    assert_eq!(locate_all(&gpu.with_memory(memory), &asked, how.tolerance, SILENT).unwrap().answer.owners, whole.owners);
     for within in [0.7, f32::INFINITY] {
         let whole = query::nearest(&tree, &points, within, SILENT).unwrap();
         let told = RefCell::new(Vec::new());
@@ -71,7 +65,6 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
         assert_eq!(bits(&found.answer.distances()), bits(&whole.distances()));
         assert!(whole.owners.iter().filter(|&&owner| owner != u32::MAX).count() > 500);
     }
-    most
 }
 
 /// A grid with fields on points and cells, and with bad cells.
@@ -106,13 +99,11 @@ fn answers_are_those_of_the_whole() {
 }
 
 fn located(gpu: &Gpu, mesh: &Mesh) {
-    for (alpha, assign, lists, how) in [
-        (0.0, Assign::Aabb, Lists::Boundary, (1e-5, LocateMethod::Sorted, On::Points)),
-        (1.0, Assign::Aabb, Lists::All, (0.01, LocateMethod::Runs, On::Cells)),
-    ] {
+    for (alpha, assign, lists, tolerance, method) in
+        [(0.0, Assign::Aabb, Lists::Boundary, 1e-5, LocateMethod::Sorted), (1.0, Assign::Aabb, Lists::All, 0.01, LocateMethod::Runs)]
+    {
         let options = BuildOptions { alpha, assign, lists, ..BuildOptions::default() };
-        let trees = check(gpu, mesh, &options, 768 << 10, how);
-        assert!(trees > 4, "{trees} trees");
+        check(gpu, mesh, &options, 768 << 10, LocateOptions { tolerance, method });
     }
 }
 
@@ -121,15 +112,15 @@ fn refused(gpu: &Gpu, mesh: &Mesh) {
     let options = BuildOptions::default();
     let points = points(mesh, 100);
     let asked = LocateRequest { mesh, options, points: &points };
-    let found = locate(&gpu.with_memory(64 << 20), &asked, None, &LocateOptions::default(), SILENT).unwrap();
+    let found = locate(&gpu.with_memory(64 << 20), &asked, &LocateOptions::default(), SILENT).unwrap();
     assert_eq!((found.trees, found.bad_cells), (1, [mesh.tets.len().div_ceil(997) as u32, 0]));
-    let refused = locate(&gpu.with_memory(1 << 14), &asked, None, &LocateOptions::default(), SILENT).unwrap_err();
+    let refused = locate(&gpu.with_memory(1 << 14), &asked, &LocateOptions::default(), SILENT).unwrap_err();
     assert!(matches!(&refused, Error::TooLarge(why) if why.contains("16384 bytes")), "{refused}");
     // Blocks as small as these are not cut, so they are asked for few points at a time.
     let small = kuhn_jittered([3; 3], 0.1, 1).unwrap();
     let points: Vec<[f32; 3]> = (0..20_000).map(|i| [i as f32 * 1.5e-4, 1.5, 1.5]).collect();
     let asked = LocateRequest { mesh: &small, options, points: &points };
-    let found = locate(&gpu.with_memory(200 << 10), &asked, None, &LocateOptions::default(), SILENT).unwrap();
+    let found = locate(&gpu.with_memory(200 << 10), &asked, &LocateOptions::default(), SILENT).unwrap();
     assert!(found.trees == 1 && !found.answer.owners.contains(&u32::MAX), "{} trees", found.trees);
 }
 
@@ -142,7 +133,7 @@ fn remedied(gpu: &Gpu) {
     let settings = RenderSettings { size: [300, 20], ..RenderSettings::default() };
     let voxels = &SliceSettings { size: [500, 0], ..SliceSettings::default() }.voxels([0.0; 3], [1.0; 3], [0.0; 3]).unwrap();
     let queries: [Query<'_>; 4] = [
-        &|gpu| Ok(locate(gpu, &LocateRequest { mesh, options, points: &points }, None, &LocateOptions::default(), SILENT)?.trees),
+        &|gpu| Ok(locate(gpu, &LocateRequest { mesh, options, points: &points }, &LocateOptions::default(), SILENT)?.trees),
         &|gpu| Ok(render(gpu, &RenderRequest { mesh, options, field, settings: &settings }, SILENT)?.trees),
         &|gpu| {
             let asked = SliceRequest { mesh, options, field: Some(field), voxels, extrapolate: Extrapolate::Nearest };
@@ -169,13 +160,7 @@ fn flat(gpu: &Gpu) {
         mesh.tets.iter().map(|ids| [0, 1, 2].map(|c| ids.iter().map(|&v| 0.25 * mesh.points[v as usize][c]).sum())).collect();
     let ask = |fineness| {
         let options = BuildOptions { fineness, ..BuildOptions::default() };
-        locate(
-            &gpu.with_memory(768 << 10),
-            &LocateRequest { mesh: &mesh, options, points: &points },
-            None,
-            &LocateOptions::default(),
-            SILENT,
-        )
+        locate(&gpu.with_memory(768 << 10), &LocateRequest { mesh: &mesh, options, points: &points }, &LocateOptions::default(), SILENT)
     };
     assert!(matches!(ask(Fineness::Alpha), Err(Error::TooLarge(_))));
     let found = ask(Fineness::Points).unwrap();

@@ -82,7 +82,7 @@ fn calls_can_be_cancelled() {
         ("overlap", query::overlap(&tree, &tree, false, &enough).map(drop)),
         ("pairs", query::overlap(&tree, &whole, true, &enough).map(drop)),
         ("slice", query::slice(&tree, None, &voxels, Extrapolate::Nearest, &enough, &mut |_| Ok(())).map(drop)),
-        ("blocks", blocks::locate(&gpu.with_memory(1 << 30), &asked, None, &how, &enough).map(drop)),
+        ("blocks", blocks::locate(&gpu.with_memory(1 << 30), &asked, &how, &enough).map(drop)),
         ("render", {
             let plan = query::prepare_picture(&device, &mesh, field, &settings).unwrap();
             query::render(&tree, &plan.plan, (&field.values, field.on), Some(&plan.normals), &enough).map(drop)

@@ -2,16 +2,15 @@
 
 use super::cut::{Placed, Source};
 use super::size::least_bytes;
-use super::{ANYWHERE, InBlocks, LEAST, Refused, Tried, check_field, pieces, smaller, try_block, unless_too_large};
+use super::{ANYWHERE, InBlocks, LEAST, Refused, Tried, pieces, smaller, try_block, unless_too_large};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::grid::CellRange;
 use crate::layout::NONE;
-use crate::mesh::{Mesh, On};
+use crate::mesh::Mesh;
 use crate::options::{BuildOptions, POINT_CHUNK};
 use crate::query::{self, AllOwners, LocateOptions, Located, Progress, SILENT, numbered};
 use crate::reference::locate::place;
-use crate::times::StageTimes;
 use std::slice::from_ref;
 
 /// Bytes of device memory per point during point location, with a reserve.
@@ -30,33 +29,19 @@ pub struct LocateRequest<'a> {
     pub points: &'a [[f32; 3]],
 }
 
-/// Finds the owner of each point, as [`query::locate`] does, within the memory limit of `gpu`. `report` receives the
-/// number of points done, and of all.
+/// Finds the owner of each point, as [`query::locate`] without a field does, within the memory limit of `gpu`; for
+/// values, see [`crate::reference::locate::Location::value`]. `report` receives the number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`query::locate`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is
 /// too small for the smallest blocks, or for 2^32 points and more.
-pub fn locate(
-    gpu: &Gpu,
-    asked: &LocateRequest<'_>,
-    field: Option<(&[f32], On)>,
-    how: &LocateOptions,
-    report: Progress<'_>,
-) -> Result<InBlocks<Located>> {
-    let (mesh, n) = (asked.mesh, asked.points.len());
-    check_field(mesh, field)?;
-    let nan = f32::from_bits(0x7fc0_0000);
-    let values = vec![nan; if field.is_some() { n } else { 0 }];
-    let mut all = Located { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], values, times: StageTimes::default() };
+pub fn locate(gpu: &Gpu, asked: &LocateRequest<'_>, how: &LocateOptions, report: Progress<'_>) -> Result<InBlocks<Located>> {
+    let n = asked.points.len();
+    let mut all = Located { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], ..Located::default() };
     let took = each(gpu, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
-        let here = field.map(|(values, on)| (placed.values(values, on), on));
-        let here = here.as_ref().map(|(values, on)| (&values[..], *on));
-        let found = query::locate(&placed.tree, points, here, how, SILENT)?;
+        let found = query::locate(&placed.tree, points, None, how, SILENT)?;
         for (k, i) in ids.iter().map(|&i| i as usize).enumerate() {
             (all.owners[i], all.barycentrics[i]) = (placed.tet(found.owners[k]), found.barycentrics[k]);
-            if field.is_some() {
-                all.values[i] = found.values[k];
-            }
         }
         all.times.add(found.times);
         Ok(())

@@ -95,7 +95,7 @@ impl Engine for Device {
     }
 
     fn locate(&self, asked: &LocateRequest<'_>, how: &LocateOptions, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
-        blocks::locate(&self.limited(), asked, None, how, report)
+        blocks::locate(&self.limited(), asked, how, report)
     }
 
     fn locate_all(&self, asked: &LocateRequest<'_>, tolerance: f32, report: OnProgress<'_>) -> Result<InBlocks<AllOwners>> {
