@@ -7,7 +7,7 @@ mod shapes;
 pub use shapes::{Origin, Shapes};
 
 use crate::common::{Common, Failure, Outcome};
-use olbvh::blocks::{InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
+use olbvh::blocks::{Cost, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Bounds, Fault, Mesh};
@@ -32,17 +32,17 @@ pub trait Engine {
     /// Marks the boundary, builds the tree, and reports the properties of both.
     fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary>;
     /// Builds a tree over a mesh and finds the owner and barycentric coordinates of each point.
-    fn locate(&self, asked: &LocateRequest<'_>, how: &LocateOptions, report: OnProgress<'_>) -> Result<InBlocks<Located>>;
+    fn locate(&self, asked: &LocateRequest<'_>, how: &LocateOptions, report: OnProgress<'_>) -> Result<(Located, Cost)>;
     /// Builds a tree over a mesh and finds every tetrahedron that contains each point.
-    fn locate_all(&self, asked: &LocateRequest<'_>, tolerance: f32, report: OnProgress<'_>) -> Result<InBlocks<AllOwners>>;
+    fn locate_all(&self, asked: &LocateRequest<'_>, tolerance: f32, report: OnProgress<'_>) -> Result<(AllOwners, Cost)>;
     /// Builds a tree over a mesh and finds the place of its surface that is closest to each point, at most `within` away.
-    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, report: OnProgress<'_>) -> Result<InBlocks<Nearest>>;
+    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, report: OnProgress<'_>) -> Result<(Nearest, Cost)>;
     /// Builds a tree over each of two meshes and finds where they overlap.
-    fn overlap(&self, asked: &OverlapRequest<'_>, report: OnProgress<'_>) -> Result<InBlocks<Overlapped>>;
+    fn overlap(&self, asked: &OverlapRequest<'_>, report: OnProgress<'_>) -> Result<(Overlapped, Cost)>;
     /// Builds a tree over a mesh and draws a field.
-    fn render(&self, asked: &RenderRequest<'_>, report: OnProgress<'_>) -> Result<InBlocks<Picture>>;
+    fn render(&self, asked: &RenderRequest<'_>, report: OnProgress<'_>) -> Result<(Picture, Cost)>;
     /// Builds a tree over a mesh and slices it, band by band into `sink`.
-    fn slice(&self, asked: &SliceRequest<'_>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Sliced>>;
+    fn slice(&self, asked: &SliceRequest<'_>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<(Sliced, Cost)>;
 }
 
 /// Figures about a mesh and its tree.

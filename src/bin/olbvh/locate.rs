@@ -5,7 +5,7 @@ use crate::engine::{self, Engine, OnProgress};
 use crate::input::{self, MemoryArgs, TreeArgs, WarpArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{counted, grouped, in_blocks, milliseconds, single};
-use olbvh::blocks::{InBlocks, LocateRequest};
+use olbvh::blocks::{Cost, LocateRequest};
 use olbvh::formats::{
     Fate, LoadOptions, Loaded, Located, Merge, OutputFile, OutputFormat, load, load_points, read_points, without_lengths, write_json,
     write_located, write_npy,
@@ -109,11 +109,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let report = |done: u64, total: u64| progress.follow(done, total);
     let start = Instant::now();
     let (found, beside, took, seconds) = if args.all {
-        let (all, took) = engine.locate_all(&asked, args.tolerance, &report)?.into_parts();
+        let (all, took) = engine.locate_all(&asked, args.tolerance, &report)?;
         let seconds = start.elapsed().as_secs_f64();
         (write_every_owner(&output, mesh, &all.owners)?, 0, took, seconds)
     } else {
-        let (mut located, took) = engine.locate(&asked, &how, &report)?.into_parts();
+        let (mut located, took) = engine.locate(&asked, &how, &report)?;
         let found = with_owner(&located);
         let distances = args.within.map(|within| move_beside(&*engine, &asked, &mut located, within, &report)).transpose()?;
         let values = columns(mesh, &fields, args.all_fields, &located, distances);
@@ -182,7 +182,7 @@ struct Done<'a> {
     /// Points outside that have a place of the surface instead.
     beside: usize,
     fields: Vec<&'a Field>,
-    took: InBlocks,
+    took: Cost,
     seconds: f64,
     device: String,
 }
@@ -247,7 +247,7 @@ fn move_beside(
     if points.is_empty() {
         return Ok(distances);
     }
-    let (nearest, _) = engine.nearest(&LocateRequest { points: &points, ..*asked }, within, report)?.into_parts();
+    let (nearest, _) = engine.nearest(&LocateRequest { points: &points, ..*asked }, within, report)?;
     for (k, (&i, distance)) in outside.iter().zip(nearest.distances()).enumerate() {
         (located.owners[i], located.barycentrics[i], distances[i]) = (nearest.owners[k], nearest.barycentrics[k], distance);
     }

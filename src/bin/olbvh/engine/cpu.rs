@@ -1,7 +1,7 @@
 //! The engine that computes on the CPU with the reference implementation.
 
 use super::{Engine, OnProgress, Sink, Summary};
-use olbvh::blocks::{InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
+use olbvh::blocks::{Cost, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
 use olbvh::error::Result;
 use olbvh::mesh::Mesh;
 use olbvh::options::{BuildOptions, POINT_CHUNK, POINT_CODE_BITS};
@@ -65,18 +65,18 @@ impl Engine for Cpu {
         })
     }
 
-    fn locate(&self, asked: &LocateRequest<'_>, how: &LocateOptions, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
+    fn locate(&self, asked: &LocateRequest<'_>, how: &LocateOptions, report: OnProgress<'_>) -> Result<(Located, Cost)> {
         on_host(asked.mesh, &asked.options, |tree| tree.locate(asked.points, how, report))
     }
 
-    fn locate_all(&self, asked: &LocateRequest<'_>, tolerance: f32, report: OnProgress<'_>) -> Result<InBlocks<AllOwners>> {
+    fn locate_all(&self, asked: &LocateRequest<'_>, tolerance: f32, report: OnProgress<'_>) -> Result<(AllOwners, Cost)> {
         on_host(asked.mesh, &asked.options, |tree| {
             let locator = Locator::new(tree.mesh, &tree.topology, &tree.tree).with_tolerance(tolerance);
             Ok(AllOwners { owners: each(asked.points, |p| locator.owners(p), report)?, ..AllOwners::default() })
         })
     }
 
-    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
+    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, report: OnProgress<'_>) -> Result<(Nearest, Cost)> {
         on_host(asked.mesh, &asked.options, |tree| {
             let surface = Surface::new(tree.mesh, &tree.topology, &tree.tree);
             let found = each(asked.points, |p| surface.nearest(p, within).unwrap_or((Location::NOWHERE, f32::INFINITY)), report)?;
@@ -90,7 +90,7 @@ impl Engine for Cpu {
         })
     }
 
-    fn overlap(&self, asked: &OverlapRequest<'_>, report: OnProgress<'_>) -> Result<InBlocks<Overlapped>> {
+    fn overlap(&self, asked: &OverlapRequest<'_>, report: OnProgress<'_>) -> Result<(Overlapped, Cost)> {
         let ([a, b], options) = (asked.meshes, &asked.options);
         let start = Instant::now();
         let (topology_a, topology_b) = (topology(a)?, topology(b)?);
@@ -102,10 +102,10 @@ impl Engine for Cpu {
         let answer = Overlapped { overlap: found, ..Overlapped::default() };
         report(1, 1)?;
         let bad_cells = [topology_a.counts.bad, topology_b.counts.bad];
-        Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds, bad_cells })
+        Ok((answer, Cost { trees: 2, peak: 0, build_seconds, bad_cells }))
     }
 
-    fn render(&self, asked: &RenderRequest<'_>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
+    fn render(&self, asked: &RenderRequest<'_>, report: OnProgress<'_>) -> Result<(Picture, Cost)> {
         on_host(asked.mesh, &asked.options, |tree| {
             let scene = Drawing::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
             let volume::Picture { colors, stats, times, .. } = volume::render(&scene, report)?;
@@ -113,7 +113,7 @@ impl Engine for Cpu {
         })
     }
 
-    fn slice(&self, asked: &SliceRequest<'_>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Sliced>> {
+    fn slice(&self, asked: &SliceRequest<'_>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<(Sliced, Cost)> {
         let SliceRequest { field, voxels, extrapolate, .. } = *asked;
         on_host(asked.mesh, &asked.options, |tree| {
             let slicer = Slicer::new(tree.mesh, &tree.topology, &tree.tree, field, *voxels, extrapolate)?;
@@ -132,10 +132,10 @@ impl Engine for Cpu {
 }
 
 /// Builds the tree over the whole mesh and computes an answer with it.
-fn on_host<T>(mesh: &Mesh, options: &BuildOptions, answer: impl FnOnce(&CpuTree<'_>) -> Result<T>) -> Result<InBlocks<T>> {
+fn on_host<T>(mesh: &Mesh, options: &BuildOptions, answer: impl FnOnce(&CpuTree<'_>) -> Result<T>) -> Result<(T, Cost)> {
     let tree = CpuTree::new(mesh, options)?;
-    let bad_cells = [tree.topology.counts.bad, 0];
-    Ok(InBlocks { answer: answer(&tree)?, trees: 1, peak: 0, build_seconds: tree.build_ms / 1e3, bad_cells })
+    let cost = Cost { trees: 1, peak: 0, build_seconds: tree.build_ms / 1e3, bad_cells: [tree.topology.counts.bad, 0] };
+    Ok((answer(&tree)?, cost))
 }
 
 impl<'a> CpuTree<'a> {

@@ -2,7 +2,7 @@
 
 use super::{Engine, OnProgress, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
-use olbvh::blocks::{self, InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
+use olbvh::blocks::{self, Cost, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
@@ -94,27 +94,27 @@ impl Engine for Device {
         })
     }
 
-    fn locate(&self, asked: &LocateRequest<'_>, how: &LocateOptions, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
+    fn locate(&self, asked: &LocateRequest<'_>, how: &LocateOptions, report: OnProgress<'_>) -> Result<(Located, Cost)> {
         blocks::locate(&self.limited(), asked, how, report)
     }
 
-    fn locate_all(&self, asked: &LocateRequest<'_>, tolerance: f32, report: OnProgress<'_>) -> Result<InBlocks<AllOwners>> {
+    fn locate_all(&self, asked: &LocateRequest<'_>, tolerance: f32, report: OnProgress<'_>) -> Result<(AllOwners, Cost)> {
         blocks::locate_all(&self.limited(), asked, tolerance, report)
     }
 
-    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
+    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, report: OnProgress<'_>) -> Result<(Nearest, Cost)> {
         blocks::nearest(&self.limited(), asked, within, report)
     }
 
-    fn overlap(&self, asked: &OverlapRequest<'_>, report: OnProgress<'_>) -> Result<InBlocks<Overlapped>> {
+    fn overlap(&self, asked: &OverlapRequest<'_>, report: OnProgress<'_>) -> Result<(Overlapped, Cost)> {
         blocks::overlap(&self.limited(), asked, report)
     }
 
-    fn render(&self, asked: &RenderRequest<'_>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
+    fn render(&self, asked: &RenderRequest<'_>, report: OnProgress<'_>) -> Result<(Picture, Cost)> {
         blocks::render(&self.limited(), asked, report)
     }
 
-    fn slice(&self, asked: &SliceRequest<'_>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Sliced>> {
+    fn slice(&self, asked: &SliceRequest<'_>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<(Sliced, Cost)> {
         blocks::slice(&self.limited(), asked, report, sink)
     }
 }
