@@ -1,7 +1,7 @@
 //! Cutting a mesh into blocks: boxes of octree cells, and the tetrahedra of each.
 
 use super::size::{Extent, Size};
-use super::{LEAST, May, pieces, smaller};
+use super::{LEAST, May, pieces};
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -24,6 +24,7 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 const CHEAP: u64 = 16;
 
 /// A mesh to be cut into blocks.
+#[derive(Clone)]
 pub(super) struct Source<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) grid: Grid,
@@ -32,7 +33,7 @@ pub(super) struct Source<'a> {
     pub(super) level: u32,
     /// The level before memory was considered.
     wanted: u32,
-    topology: Arc<Topology>,
+    pub(super) topology: Arc<Topology>,
     vertices: Arc<Vertices>,
     /// Crowded vertices. A block may have so few of the tetrahedra there that it would not notice.
     crowded: Arc<Vec<u32>>,
@@ -83,23 +84,23 @@ impl<'a> Source<'a> {
         Ok(Self { mesh, grid, options, level: wanted, wanted, topology, vertices, crowded })
     }
 
-    /// The same mesh, with trees of the finest level, up to the one wanted, that suits `memory` bytes: the marks of
-    /// cells take at most an eighth of them, and a block of the [`LEAST`] largest tetrahedra at most half. On a finer
+    /// The same mesh, with trees of the finest level, up to the one wanted, that suits the memory limit: the marks of
+    /// cells take at most an eighth of it, and a block of the [`LEAST`] largest tetrahedra at most half. On a finer
     /// level, these would have too many candidates for any block with them to fit.
-    pub(super) fn within(&self, gpu: &Gpu, memory: u64) -> Result<Self> {
+    pub(super) fn within(&self, gpu: &Gpu) -> Result<Self> {
+        let memory = gpu.memory_limit();
         let at = |level: u32| BuildOptions { level: Some(level), ..self.options };
         let marks_fit = |level: u32| self.options.lists == Lists::All || 8u64.pow(level) / 8 <= memory / 8;
         let mut level = self.wanted;
         while level > 0 && !(marks_fit(level) && self.largest(level).bytes(gpu, &at(level))? <= memory / 2) {
             level -= 1;
         }
-        let (topology, vertices, crowded) = (self.topology.clone(), self.vertices.clone(), self.crowded.clone());
-        Ok(Self { level, options: at(level), topology, vertices, crowded, ..*self })
+        Ok(Self { level, options: at(level), ..self.clone() })
     }
 
     /// The size of a block of the [`LEAST`] tetrahedra with the most candidates at a level.
     fn largest(&self, level: u32) -> Size {
-        let counts = (0..self.mesh.tets.len() as u32).into_par_iter().filter(|&t| self.is_valid(t));
+        let counts = (0..self.mesh.tets.len() as u32).into_par_iter().filter(|&t| self.topology.is_valid(t));
         let mut counts: Vec<u32> = counts.map(|t| self.vertices.cells(self.mesh.tets[t as usize], level).count()).collect();
         if counts.len() > LEAST {
             counts.select_nth_unstable_by(LEAST, |a, b| b.cmp(a));
@@ -109,15 +110,15 @@ impl<'a> Source<'a> {
         Size { points: counts.len() as u32, tets: counts.len(), candidates, entries: candidates, leaves: candidates.min(8u64.pow(level)) }
     }
 
-    /// Whether `memory` bytes suffice for blocks that leave `beside` bytes of it unused, with cuts that `may` allows
+    /// Whether the memory limit suffices for blocks that leave `beside` bytes of it unused, with cuts that `may` allows
     /// (see [`Self::cut_in_two`]).
-    pub(super) fn fits_in_blocks(&self, gpu: &Gpu, memory: u64, beside: u64, may: May<'_>) -> Result<bool> {
-        let (source, most) = (self.within(gpu, memory)?, memory.saturating_sub(beside));
+    pub(super) fn fits_in_blocks(&self, gpu: &Gpu, beside: u64, may: May<'_>) -> Result<bool> {
+        let (source, most) = (self.within(gpu)?, gpu.memory_limit().saturating_sub(beside));
         let mut waiting = vec![source.whole()];
         while let Some(block) = waiting.pop() {
             let need = block.bytes(gpu, &source.options)?;
             if need > most {
-                let Some(halves) = smaller(&source, &block, pieces(need, most), may) else { return Ok(false) };
+                let Some(halves) = source.cut_in_two(&block, pieces(need, most), may) else { return Ok(false) };
                 waiting.extend(halves);
             }
         }
@@ -174,21 +175,12 @@ impl<'a> Source<'a> {
         neighbours(self.mesh, &self.topology.valid).0
     }
 
-    /// Number of bad tetrahedra, which no block has.
-    pub(super) fn bad_cells(&self) -> u32 {
-        self.topology.counts.bad
-    }
-
-    /// Whether a tetrahedron is not bad.
-    pub(super) fn is_valid(&self, tet: u32) -> bool {
-        self.topology.is_valid(tet)
-    }
-
     /// Cuts a block, which is finally to become `pieces` blocks, in two: with half of its tetrahedra each, or as near
-    /// to that as whole numbers of pieces allow. `None` unless both are smaller than the block. The cut lies across the
-    /// longest side where that is possible, after a cell of the finest grid on an axis, both of which `may` must allow.
+    /// to that as whole numbers of pieces allow. `None` unless it has more than [`LEAST`], and both have fewer. The cut
+    /// lies across the longest side where that is possible, after a cell of the finest grid on an axis, both of which
+    /// `may` must allow.
     pub(super) fn cut_in_two(&self, block: &Block, pieces: usize, may: May<'_>) -> Option<[Block; 2]> {
-        let span = block.span?;
+        let span = block.span.filter(|_| block.tets.len() > LEAST)?;
         let length = |c: usize| away(&self.grid, self.level, c, span.hi[c] + 1) - away(&self.grid, self.level, c, span.lo[c]);
         let mut axes = [0, 1, 2];
         axes.sort_by(|&a, &b| length(b).total_cmp(&length(a)));
@@ -262,6 +254,11 @@ impl Placed {
     /// The id in the whole mesh of tetrahedron `tet` of this block; `NONE` stays `NONE`.
     pub(super) fn tet(&self, tet: u32) -> u32 {
         self.ids.as_ref().and_then(|[_, tets]| tets.get(tet as usize).copied()).unwrap_or(tet)
+    }
+
+    /// Whether this is the given block.
+    pub(super) fn is(&self, block: &Block) -> bool {
+        self.ids.as_ref().is_some_and(|[_, tets]| Rc::ptr_eq(tets, &block.tets))
     }
 
     /// The part of a field's values that belongs to this block.

@@ -1,18 +1,15 @@
 //! Point location in blocks.
 
-use super::cut::{Placed, Source};
-use super::size::least_bytes;
-use super::{ANYWHERE, InBlocks, LEAST, Refused, Tried, check_field, pieces, smaller, try_block, unless_too_large};
+use super::cut::Placed;
+use super::{ANYWHERE, Cost, Cutter, LEAST};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::grid::CellRange;
 use crate::layout::NONE;
-use crate::mesh::{Mesh, On};
+use crate::mesh::Mesh;
 use crate::options::{BuildOptions, POINT_CHUNK};
 use crate::query::{self, AllOwners, LocateOptions, Located, Progress, SILENT, numbered};
 use crate::reference::locate::place;
-use crate::times::StageTimes;
-use std::slice::from_ref;
 
 /// Bytes of device memory per point during point location, with a reserve.
 const PER_POINT: u64 = 128;
@@ -30,49 +27,34 @@ pub struct LocateRequest<'a> {
     pub points: &'a [[f32; 3]],
 }
 
-/// Finds the owner of each point, as [`query::locate`] does, within `memory` bytes of device memory. `report` receives
-/// the number of points done, and of all.
+/// Finds the owner of each point, as [`query::locate`] without a field does, within the memory limit of `gpu`; for
+/// values, see [`crate::reference::locate::Location::value`]. `report` receives the number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`query::locate`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is
 /// too small for the smallest blocks, or for 2^32 points and more.
-pub fn locate(
-    gpu: &Gpu,
-    memory: u64,
-    asked: &LocateRequest<'_>,
-    field: Option<(&[f32], On)>,
-    how: &LocateOptions,
-    report: Progress<'_>,
-) -> Result<InBlocks<Located>> {
-    let (mesh, n) = (asked.mesh, asked.points.len());
-    check_field(mesh, field)?;
-    let nan = f32::from_bits(0x7fc0_0000);
-    let values = vec![nan; if field.is_some() { n } else { 0 }];
-    let mut all = Located { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], values, times: StageTimes::default() };
-    let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
-        let here = field.map(|(values, on)| (placed.values(values, on), on));
-        let here = here.as_ref().map(|(values, on)| (&values[..], *on));
-        let found = query::locate(&placed.tree, points, here, how, SILENT)?;
+pub fn locate(gpu: &Gpu, asked: &LocateRequest<'_>, how: &LocateOptions, report: Progress<'_>) -> Result<(Located, Cost)> {
+    let n = asked.points.len();
+    let mut all = Located { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], ..Located::default() };
+    let cost = each(gpu, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
+        let found = query::locate(&placed.tree, points, None, how, SILENT)?;
         for (k, i) in ids.iter().map(|&i| i as usize).enumerate() {
             (all.owners[i], all.barycentrics[i]) = (placed.tet(found.owners[k]), found.barycentrics[k]);
-            if field.is_some() {
-                all.values[i] = found.values[k];
-            }
         }
         all.times.add(found.times);
         Ok(())
     })?;
-    Ok(took.with(all))
+    Ok((all, cost))
 }
 
-/// Finds every tetrahedron that contains each point, as [`query::locate_all`] does, within `memory` bytes of device
-/// memory. `report` receives the number of points done, and of all.
+/// Finds every tetrahedron that contains each point, as [`query::locate_all`] does, within the memory limit of `gpu`.
+/// `report` receives the number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`locate`].
-pub fn locate_all(gpu: &Gpu, memory: u64, asked: &LocateRequest<'_>, tolerance: f32, report: Progress<'_>) -> Result<InBlocks<AllOwners>> {
+pub fn locate_all(gpu: &Gpu, asked: &LocateRequest<'_>, tolerance: f32, report: Progress<'_>) -> Result<(AllOwners, Cost)> {
     let mut all = AllOwners { owners: vec![Vec::new(); asked.points.len()], ..AllOwners::default() };
-    let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
+    let cost = each(gpu, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
         let found = query::locate_all(&placed.tree, points, tolerance, SILENT)?;
         for (&i, owners) in ids.iter().zip(found.owners) {
             all.owners[i as usize] = owners.into_iter().map(|t| placed.tet(t)).collect();
@@ -80,7 +62,7 @@ pub fn locate_all(gpu: &Gpu, memory: u64, asked: &LocateRequest<'_>, tolerance: 
         all.times.add(found.times);
         Ok(())
     })?;
-    Ok(took.with(all))
+    Ok((all, cost))
 }
 
 /// The work on some points (their numbers, then their coordinates) in a block, whose finest cells are given, or the whole
@@ -97,73 +79,59 @@ pub(super) enum Blocks {
 }
 
 /// Queries the whole mesh, if it fits, or one block after another.
-pub(super) fn each(
-    gpu: &Gpu,
-    memory: u64,
-    asked: &LocateRequest<'_>,
-    blocks: Blocks,
-    report: Progress<'_>,
-    ask: Ask<'_>,
-) -> Result<InBlocks> {
-    let LocateRequest { mesh, ref options, points } = *asked;
-    let gpu = &gpu.with_memory(memory);
-    let all: Vec<u32> = (0..numbered(points.len())?).collect();
-    let mut job = Job { gpu, points, done: 0.0, told: 0, took: InBlocks::default(), ask, report };
-    if least_bytes(gpu, mesh, options)? <= memory {
-        let whole = job.took.place(gpu, mesh, options, 0);
-        let answered = unless_too_large(whole.and_then(|placed| job.ask(&placed, None, &all, 1.0)))?;
-        if answered.is_some() {
-            return Ok(job.end());
-        }
+pub(super) fn each(gpu: &Gpu, asked: &LocateRequest<'_>, blocks: Blocks, report: Progress<'_>, ask: Ask<'_>) -> Result<Cost> {
+    let all: Vec<u32> = (0..numbered(asked.points.len())?).collect();
+    let mut cost = Cost::default();
+    let mut job = Job { gpu, asked, done: 0.0, told: 0, ask, report };
+    if cost.whole(gpu, asked.mesh, &asked.options, |placed| job.ask(placed, None, &all, 1.0))?.is_none() {
         job.done = 0.0;
+        job.in_blocks(all, blocks, &mut cost)?;
     }
-    let source = Source::new(mesh, options)?.within(gpu, memory)?;
-    job.took.bad_cells[0] = source.bad_cells();
-    // The other points lie so far outside that they have no cell.
-    let near: Vec<u32> = all.into_iter().filter(|&i| place(&source.grid, points[i as usize]).is_some()).collect();
-    // Of the work on these points, a block has this share; where each point has one block, all of it.
-    let mut waiting = vec![(source.whole(), near, 1.0)];
-    while let Some((block, ids, share)) = waiting.pop() {
-        if ids.is_empty() || block.tets.is_empty() {
-            job.advance(ids.len(), share)?;
-            continue;
-        }
-        let before = job.done;
-        let need = block.bytes(gpu, &source.options)?;
-        let tried = try_block(need, memory, || {
-            let placed = job.took.build(|| block.place(gpu, &source))?;
-            job.ask(&placed, Some(block.cells.finest(source.level)), &ids, share)
-        })?;
-        let Tried::TooLarge(why) = tried else { continue };
-        job.done = before;
-        let Some([low, high]) = smaller(&source, &block, pieces(need, memory), ANYWHERE) else {
-            let beside = PER_POINT * FEW.min(ids.len()) as u64;
-            let refused = Refused { gpu, sources: from_ref(&source), beside, may: ANYWHERE };
-            return Err(refused.error(block.tets.len(), need, why));
-        };
-        let is_low = |&i: &u32| low.cells.contains(source.cell(points[i as usize]));
-        let every = blocks == Blocks::All;
-        let share = if every { share / 2.0 } else { share };
-        let (below, above) = if every { (ids.clone(), ids) } else { ids.into_iter().partition(is_low) };
-        waiting.extend([(high, above, share), (low, below, share)]);
-    }
-    report(points.len() as u64, points.len() as u64)?;
-    Ok(job.end())
+    Ok(cost.with_peak(gpu))
 }
 
 struct Job<'a> {
     gpu: &'a Gpu,
-    points: &'a [[f32; 3]],
+    asked: &'a LocateRequest<'a>,
     /// Points done so far; of one that several blocks are asked about, their shares.
     done: f64,
     /// The most that was reported: a block that turns out not to fit is done again, and progress waits until then.
     told: u64,
-    took: InBlocks,
     ask: Ask<'a>,
     report: Progress<'a>,
 }
 
 impl Job<'_> {
+    /// Queries one block after another about all points.
+    fn in_blocks(&mut self, all: Vec<u32>, blocks: Blocks, cost: &mut Cost) -> Result<()> {
+        let (gpu, LocateRequest { mesh, ref options, points }) = (self.gpu, *self.asked);
+        let source = cost.source(gpu, mesh, options)?;
+        // The other points lie so far outside that they have no cell.
+        let near: Vec<u32> = all.into_iter().filter(|&i| place(&source.grid, points[i as usize]).is_some()).collect();
+        // Of the work on these points, a block has this share; where each point has one block, all of it.
+        let mut waiting = vec![(source.whole(), near, 1.0)];
+        while let Some((block, ids, share)) = waiting.pop() {
+            if ids.is_empty() || block.tets.is_empty() {
+                self.advance(ids.len(), share)?;
+                continue;
+            }
+            let before = self.done;
+            let cutter = Cutter { gpu, sources: [&source], beside: PER_POINT * FEW.min(ids.len()) as u64, may: ANYWHERE };
+            let halves = cutter.work_or_halve(&block, || {
+                let placed = cost.build(|| block.place(gpu, &source))?;
+                self.ask(&placed, Some(block.cells.finest(source.level)), &ids, share)
+            })?;
+            let Some([low, high]) = halves else { continue };
+            self.done = before;
+            let is_low = |&i: &u32| low.cells.contains(source.cell(points[i as usize]));
+            let every = blocks == Blocks::All;
+            let share = if every { share / 2.0 } else { share };
+            let (below, above) = if every { (ids.clone(), ids) } else { ids.into_iter().partition(is_low) };
+            waiting.extend([(high, above, share), (low, below, share)]);
+        }
+        (self.report)(points.len() as u64, points.len() as u64)
+    }
+
     /// Queries the points in chunks that fit the memory that is left.
     fn ask(&mut self, placed: &Placed, cells: Option<CellRange>, ids: &[u32], share: f64) -> Result<()> {
         let input = placed.mesh.input();
@@ -175,7 +143,7 @@ impl Job<'_> {
             return Err(Error::Memory { name: "olbvh.blocks.points".into(), bytes, reason });
         }
         for chunk in ids.chunks(most.max(1)) {
-            let points: Vec<_> = chunk.iter().map(|&i| self.points[i as usize]).collect();
+            let points: Vec<_> = chunk.iter().map(|&i| self.asked.points[i as usize]).collect();
             (self.ask)(chunk, &points, placed, cells)?;
             self.advance(chunk.len(), share)?;
         }
@@ -187,11 +155,7 @@ impl Job<'_> {
     fn advance(&mut self, points: usize, share: f64) -> Result<()> {
         self.done += share * points as f64;
         self.told = self.told.max(self.done as u64);
-        (self.report)(self.told, self.points.len() as u64)
-    }
-
-    fn end(&self) -> InBlocks {
-        InBlocks { peak: self.gpu.memory_peak(), ..self.took.clone() }
+        (self.report)(self.told, self.asked.points.len() as u64)
     }
 }
 

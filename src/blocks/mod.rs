@@ -1,5 +1,5 @@
 //! Meshes that do not fit the device's memory, processed in blocks: these are built, queried and dropped one after
-//! another, each within a given number of bytes.
+//! another, each within the memory limit of the given handle.
 //!
 //! Each block is a box of octree cells on the tree's level; a box is cut in two by numbers of tetrahedra. A block
 //! contains its *core*, which is every tetrahedron whose quantized box meets these cells, and the tetrahedra that share
@@ -19,7 +19,8 @@
 //! Memory and limits:
 //! - A mesh that fits is not cut. Whether a block fits is first estimated; a block that turns out to be larger is
 //!   abandoned and cut again.
-//! - The limit is enforced by [`Gpu::with_memory`], which counts every buffer, transfer buffers included.
+//! - The limit is that of the handle ([`Gpu::with_memory`]), which counts every buffer, transfer buffers included.
+//!   Without one, what the device refuses is cut.
 //! - The mesh itself is in host memory as a whole, with an additional 6 bytes per point and 4 per tetrahedron.
 //!   Rendering adds normals (12 bytes per point), rays (52 bytes each), and at the start neighbours (16 bytes per
 //!   tetrahedron, and about three times that while they are matched).
@@ -45,19 +46,18 @@ pub use slice::{SliceRequest, slice};
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::mesh::{Mesh, On};
+use crate::mesh::Mesh;
 use crate::options::BuildOptions;
 use cut::{Block, Placed, Source};
+use size::least_bytes;
 use std::time::Instant;
 
-/// An answer, and its cost.
-#[derive(Clone, Debug, Default)]
-pub struct InBlocks<T = ()> {
-    /// The answer, equal to that of the whole mesh.
-    pub answer: T,
-    /// Number of trees built for it; 1 per mesh if that fitted as a whole.
+/// What an answer took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cost {
+    /// Number of trees built; 1 per mesh if that fitted as a whole.
     pub trees: u32,
-    /// The most bytes of device memory in use simultaneously.
+    /// The most bytes that buffers of the given handle took simultaneously ([`Gpu::memory_peak`]).
     pub peak: u64,
     /// Seconds spent on building trees, transfers included.
     pub build_seconds: f64,
@@ -65,22 +65,7 @@ pub struct InBlocks<T = ()> {
     pub bad_cells: [u32; 2],
 }
 
-impl<T> InBlocks<T> {
-    /// Splits off the answer.
-    pub fn into_parts(self) -> (T, InBlocks) {
-        let Self { answer, trees, peak, build_seconds, bad_cells } = self;
-        (answer, InBlocks { answer: (), trees, peak, build_seconds, bad_cells })
-    }
-}
-
-impl InBlocks {
-    /// Adds an answer.
-    #[must_use]
-    pub fn with<T>(self, answer: T) -> InBlocks<T> {
-        let Self { answer: (), trees, peak, build_seconds, bad_cells } = self;
-        InBlocks { answer, trees, peak, build_seconds, bad_cells }
-    }
-
+impl Cost {
     /// Builds a tree and adds its cost.
     fn build<T>(&mut self, build: impl FnOnce() -> Result<T>) -> Result<T> {
         let start = Instant::now();
@@ -96,34 +81,37 @@ impl InBlocks {
         self.bad_cells[side] = placed.mesh.status().bad;
         Ok(placed)
     }
-}
 
-/// An answer for the whole mesh; `None`, with the reason in the log, if there is too little memory for it.
-fn unless_too_large<T>(answer: Result<T>) -> Result<Option<T>> {
-    match answer {
-        Err(e) if e.is_lack_of_room() => {
-            log::info!("in blocks, since the whole does not fit: {e}");
-            Ok(None)
-        }
-        answer => answer.map(Some),
+    /// The answer for the only mesh as a whole; `None` if that does not fit.
+    fn whole<T>(&mut self, gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, answer: impl FnOnce(&Placed) -> Result<T>) -> Result<Option<T>> {
+        let least = least_bytes(gpu, mesh, options)?;
+        Ok(attempt(gpu, least, || answer(&self.place(gpu, mesh, options, 0)?))?.ok())
+    }
+
+    /// Prepares the only mesh to be cut into blocks.
+    fn source<'a>(&mut self, gpu: &Gpu, mesh: &'a Mesh, options: &BuildOptions) -> Result<Source<'a>> {
+        let source = Source::new(mesh, options)?.within(gpu)?;
+        self.bad_cells[0] = source.topology.counts.bad;
+        Ok(source)
+    }
+
+    /// With the most memory in use until now.
+    fn with_peak(self, gpu: &Gpu) -> Self {
+        Self { peak: gpu.memory_peak(), ..self }
     }
 }
 
-/// How the work on a block ended.
-enum Tried {
-    Done,
-    /// The block does not fit; if it was tried, the reason.
-    TooLarge(Option<Error>),
-}
-
-/// Does the work on a block that takes about `need` bytes, if there are as many.
-fn try_block(need: u64, memory: u64, work: impl FnOnce() -> Result<()>) -> Result<Tried> {
-    if need > memory {
-        return Ok(Tried::TooLarge(None));
+/// The result of work that takes `need` bytes, or a lack of room for it: the error if it was tried.
+fn attempt<T>(gpu: &Gpu, need: u64, work: impl FnOnce() -> Result<T>) -> Result<Result<T, Option<Error>>> {
+    if need > gpu.memory_limit() {
+        return Ok(Err(None));
     }
     match work() {
-        Err(e) if e.is_lack_of_room() => Ok(Tried::TooLarge(Some(e))),
-        done => done.map(|()| Tried::Done),
+        Err(e) if e.is_lack_of_room() => {
+            log::info!("in smaller blocks, since this does not fit: {e}");
+            Ok(Err(Some(e)))
+        }
+        done => done.map(Ok),
     }
 }
 
@@ -142,45 +130,58 @@ type May<'a> = &'a dyn Fn(usize, u32) -> bool;
 /// Allows every cut.
 const ANYWHERE: May<'_> = &|_, _| true;
 
-/// Cuts a block in two, if it is large enough, as a step towards `pieces` blocks.
-fn smaller(source: &Source<'_>, block: &Block, pieces: usize, may: May<'_>) -> Option<[Block; 2]> {
-    if block.tets.len() > LEAST { source.cut_in_two(block, pieces, may) } else { None }
-}
-
-/// Rejects a field whose length does not match the mesh.
-fn check_field(mesh: &Mesh, field: Option<(&[f32], On)>) -> Result<()> {
-    field.map_or(Ok(()), |(values, on)| on.check(values, [mesh.points.len(), mesh.tets.len()]))
-}
-
-/// What was to be done within too little memory.
-struct Refused<'a, 's> {
+/// Works on blocks, one of each mesh at a time, and cuts those that do not fit.
+struct Cutter<'a, const N: usize> {
     gpu: &'a Gpu,
-    /// The meshes of which a block each is in memory at a time.
-    sources: &'a [Source<'s>],
+    sources: [&'a Source<'a>; N],
     /// Bytes that the query takes beside the blocks.
     beside: u64,
     /// The cuts that the query allows.
     may: May<'a>,
 }
 
-impl Refused<'_, '_> {
-    /// The error for a block of `tets` tetrahedra (or one of each mesh) that takes about `bytes`, or failed for the
-    /// reason `why`, and is not cut again. If that is not the memory, `why` itself is the error.
-    fn error(&self, tets: usize, bytes: u64, why: Option<Error>) -> Error {
+impl Cutter<'_, 1> {
+    /// Does the work on a block, or returns its halves if it does not fit.
+    fn work_or_halve(&self, block: &Block, work: impl FnOnce() -> Result<()>) -> Result<Option<[Block; 2]>> {
+        let [source] = self.sources;
+        let need = block.bytes(self.gpu, &source.options)?;
+        let halve = || source.cut_in_two(block, pieces(need, self.gpu.memory_limit()), self.may);
+        self.work_or_cut(need, block.tets.len(), work, halve)
+    }
+}
+
+impl<const N: usize> Cutter<'_, N> {
+    /// Does the work on blocks of `tets` tetrahedra together, which takes about `need` bytes, or cuts them if it does
+    /// not fit.
+    fn work_or_cut<T>(
+        &self,
+        need: u64,
+        tets: usize,
+        work: impl FnOnce() -> Result<()>,
+        cut: impl FnOnce() -> Option<T>,
+    ) -> Result<Option<T>> {
+        match attempt(self.gpu, need, work)? {
+            Ok(()) => Ok(None),
+            Err(why) => cut().map(Some).ok_or_else(|| self.refusal(need, tets, why)),
+        }
+    }
+
+    /// The error for blocks that are not cut again: the reason `why` they failed, if that is not the memory.
+    fn refusal(&self, need: u64, tets: usize, why: Option<Error>) -> Error {
         if let Some(numbers @ Error::TooLarge(_)) = why {
             return numbers;
         }
         let limit = self.gpu.memory_limit();
         let why = why.map_or_else(String::new, |e| format!(" ({e})"));
-        let finer = tets > LEAST && self.sources.iter().any(Source::has_level_wanted);
+        let finer = tets > LEAST && self.sources.iter().any(|source| source.has_level_wanted());
         let finer = if finer { ", or a finer tree, whose cells cut the mesh into smaller blocks" } else { "" };
         if let Some(enough) = self.enough(limit.max(self.beside)) {
             return Error::TooLarge(format!(
                 "{limit} bytes of device memory are too few for blocks of the mesh{why}; allow {enough} bytes or more{finer}"
             ));
         }
-        let block = if self.sources.len() == 1 { "a block" } else { "a pair of blocks" };
-        let takes = if bytes == u64::MAX { "more than 32-bit indices reach".into() } else { format!("about {bytes} bytes") };
+        let block = if N == 1 { "a block" } else { "a pair of blocks" };
+        let takes = if need == u64::MAX { "more than 32-bit indices reach".into() } else { format!("about {need} bytes") };
         Error::TooLarge(format!(
             "{limit} bytes of device memory are too few: {block} of {tets} tetrahedra, which is not cut any further, \
              takes {takes}{why}{finer}"
@@ -190,12 +191,13 @@ impl Refused<'_, '_> {
     /// An amount of memory above `least` in which all blocks fit: the first of a sequence that grows by half.
     fn enough(&self, least: u64) -> Option<u64> {
         const UNIT: u64 = 1 << 16;
-        let n = self.sources.len() as u64;
-        let fits = |memory: &u64| {
-            self.sources.iter().all(|source| source.fits_in_blocks(self.gpu, memory / n, self.beside / n, self.may).unwrap_or(false))
+        const MOST: u64 = 1 << 50;
+        let n = N as u64;
+        let fits = |source: &Source<'_>, memory: u64| {
+            source.fits_in_blocks(&self.gpu.with_memory(memory), self.beside / n, self.may).unwrap_or(false)
         };
-        let next = |memory: &u64| Some((memory / 2 * 3).next_multiple_of(UNIT)).filter(|&more| more < 1 << 50);
-        std::iter::successors(next(&least), next).find(fits)
+        let next = |memory: &u64| Some((memory.min(&MOST) / 2 * 3).next_multiple_of(UNIT)).filter(|more| more < &MOST);
+        std::iter::successors(next(&least), next).find(|memory| self.sources.iter().all(|source| fits(source, memory / n)))
     }
 }
 
@@ -208,10 +210,12 @@ mod tests {
     #[test]
     fn memory_is_no_remedy_for_a_lack_of_numbers() {
         let gpu = &Gpu::new(&GpuOptions::default()).unwrap().with_memory(1 << 20);
-        let refused = |why| Refused { gpu, sources: &[], beside: 0, may: ANYWHERE }.error(500, 100, Some(why)).to_string();
+        let cutter = Cutter { gpu, sources: [], beside: 0, may: ANYWHERE };
+        let refused = |why| cutter.work_or_cut(100, 500, || Err(why), || None::<()>).unwrap_err().to_string();
         assert_eq!(refused(Error::TooLarge("2147483648 intersecting pairs".into())), "too large: 2147483648 intersecting pairs");
         let memory = Error::Memory { name: "olbvh.test".into(), bytes: 1 << 21, reason: "none left".into() };
         assert!(refused(memory).contains("1048576 bytes of device memory are too few"));
+        assert_eq!(cutter.enough(u64::MAX), None);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The places of the surface that are closest to points, in blocks: each block tells the closest in its own cells.
 
-use super::InBlocks;
+use super::Cost;
 use super::locate::{Blocks, LocateRequest, each};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -8,16 +8,16 @@ use crate::layout::NONE;
 use crate::query::{Nearest, Progress, SILENT, nearest_in};
 use crate::times::StageTimes;
 
-/// Finds the place of the surface that is closest to each point, at most `within` away, as [`crate::query::nearest`] does, within
-/// `memory` bytes of device memory. `report` receives the number of points done, and of all.
+/// Finds the place of the surface that is closest to each point, at most `within` away, as [`crate::query::nearest`]
+/// does, within the memory limit of `gpu`. `report` receives the number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`super::locate`].
-pub fn nearest(gpu: &Gpu, memory: u64, asked: &LocateRequest<'_>, within: f32, report: Progress<'_>) -> Result<InBlocks<Nearest>> {
+pub fn nearest(gpu: &Gpu, asked: &LocateRequest<'_>, within: f32, report: Progress<'_>) -> Result<(Nearest, Cost)> {
     let n = asked.points.len();
     let (owners, barycentrics, squares) = (vec![NONE; n], vec![[0.0; 4]; n], vec![f32::INFINITY; n]);
     let mut all = Nearest { owners, barycentrics, squares, scale: 1.0, times: StageTimes::default() };
-    let took = each(gpu, memory, asked, Blocks::All, report, &mut |ids, points, placed, cells| {
+    let cost = each(gpu, asked, Blocks::All, report, &mut |ids, points, placed, cells| {
         let found = nearest_in(&placed.tree, points, within, cells, SILENT)?;
         all.scale = found.scale;
         all.times.add(found.times);
@@ -29,5 +29,5 @@ pub fn nearest(gpu: &Gpu, memory: u64, asked: &LocateRequest<'_>, within: f32, r
         }
         Ok(())
     })?;
-    Ok(took.with(all))
+    Ok((all, cost))
 }

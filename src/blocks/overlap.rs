@@ -4,7 +4,7 @@
 
 use super::cut::{Block, Placed, Source};
 use super::size::least_bytes;
-use super::{ANYWHERE, InBlocks, Refused, Tried, smaller, try_block, unless_too_large};
+use super::{ANYWHERE, Cost, Cutter, attempt};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::Mesh;
@@ -34,13 +34,16 @@ impl Node {
     }
 
     fn halves(&self, source: &Source<'_>) -> Option<&[Rc<Self>; 2]> {
-        self.halves.get_or_init(|| smaller(source, &self.block, 2, ANYWHERE).map(|halves| halves.map(Self::new))).as_ref()
+        self.halves.get_or_init(|| source.cut_in_two(&self.block, 2, ANYWHERE).map(|halves| halves.map(Self::new))).as_ref()
     }
 
     fn tets(&self) -> usize {
         self.block.tets.len()
     }
 }
+
+/// A block of each mesh.
+type Pair = [Rc<Node>; 2];
 
 /// Two meshes, which may not fit the device, and what to find.
 #[derive(Clone, Copy, Debug)]
@@ -53,18 +56,17 @@ pub struct OverlapRequest<'a> {
     pub pairs: bool,
 }
 
-/// Computes the overlap of A and B, as [`query::overlap`] does, within `memory` bytes of device memory. Pairs that are
-/// nearer to touching than 1e-6 of the scene's diagonal may be counted or not, depending on the blocks. The reported
-/// effort is the sum over all pairs of blocks. `report` receives how many millionths of the work are done, and a
+/// Computes the overlap of A and B, as [`query::overlap`] does, within the memory limit of `gpu`. Pairs that are nearer
+/// to touching than 1e-6 of the scene's diagonal may be counted or not, depending on the blocks. The reported effort is
+/// the sum over all pairs of blocks. `report` receives how many millionths of the work are done, and a
 /// million.
 ///
 /// # Errors
 /// Those of [`query::overlap`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the
 /// memory is too small for the smallest blocks.
-pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progress<'_>) -> Result<InBlocks<Overlapped>> {
+pub fn overlap(gpu: &Gpu, asked: &OverlapRequest<'_>, report: Progress<'_>) -> Result<(Overlapped, Cost)> {
     let OverlapRequest { meshes, ref options, pairs } = *asked;
-    let gpu = &gpu.with_memory(memory);
-    let mut took = InBlocks::default();
+    let mut cost = Cost::default();
     // If the whole turns out not to fit, the progress stays where it is until the blocks have come as far.
     let told = Cell::new(0);
     let tell = |share: f64| {
@@ -73,57 +75,39 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progr
     };
     // The second construction can use the scratch memory of the first one again. What it adds, the second mesh itself,
     // is half of what it takes at the least.
-    if least_bytes(gpu, meshes[0], options)?.saturating_add(least_bytes(gpu, meshes[1], options)? / 2) <= memory {
-        let found = took.place(gpu, meshes[0], options, 0).and_then(|a| {
-            let b = took.place(gpu, meshes[1], options, 1)?;
-            query::overlap(&a.tree, &b.tree, pairs, &|done, all| tell(done as f64 / all.max(1) as f64))
-        });
-        if let Some(found) = unless_too_large(found)? {
-            tell(1.0)?;
-            return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(found));
-        }
-    }
-    let [a, b] = meshes.map(|mesh| Source::new(mesh, options)?.within(gpu, memory / 2));
+    let least = least_bytes(gpu, meshes[0], options)?.saturating_add(least_bytes(gpu, meshes[1], options)? / 2);
+    let whole = attempt(gpu, least, || {
+        let a = cost.place(gpu, meshes[0], options, 0)?;
+        let b = cost.place(gpu, meshes[1], options, 1)?;
+        query::overlap(&a.tree, &b.tree, pairs, &|done, all| tell(done as f64 / all.max(1) as f64))
+    })?;
+    let found = if let Ok(found) = whole { found } else { in_blocks(gpu, asked, &tell, &mut cost)? };
+    tell(1.0)?;
+    Ok((found, cost.with_peak(gpu)))
+}
+
+/// The overlap of all pairs of blocks. `tell` receives the share of the work that is done.
+fn in_blocks(gpu: &Gpu, asked: &OverlapRequest<'_>, tell: &dyn Fn(f64) -> Result<()>, cost: &mut Cost) -> Result<Overlapped> {
+    let OverlapRequest { meshes, ref options, pairs } = *asked;
+    let half = &gpu.with_memory(gpu.memory_limit() / 2);
+    let [a, b] = meshes.map(|mesh| Source::new(mesh, options)?.within(half));
     let sources = [a?, b?];
-    took.bad_cells = sources.each_ref().map(Source::bad_cells);
+    cost.bad_cells = sources.each_ref().map(|source| source.topology.counts.bad);
     let apart = APART * sources.iter().map(Source::extent).sum::<f64>();
     let mut all = Overlapped { overlap: Overlap { pairs: pairs.then(Vec::new), ..Overlap::default() }, ..Overlapped::default() };
-    let mut placed: [Option<(Rc<Node>, Placed)>; 2] = [None, None];
+    let mut placed = [None, None];
     let mut waiting = vec![(sources.each_ref().map(|s| Node::new(s.whole())), 1.0)];
     let mut done = 0.0;
     while let Some((nodes, share)) = waiting.pop() {
-        if !meet(&sources, &nodes, apart) {
-            done += share;
-            tell(done)?;
-            continue;
-        }
-        let mut need = PER_TET * (nodes[0].tets() + nodes[1].tets()) as u64;
-        for (node, source) in nodes.iter().zip(&sources) {
-            need = need.saturating_add(node.block.bytes(gpu, &source.options)?);
-        }
-        let tried = try_block(need, memory, || {
-            merge(&mut all, visit(gpu, &sources, &nodes, &mut placed, pairs, &mut took)?);
-            Ok(())
-        })?;
-        let Tried::TooLarge(why) = tried else {
-            done += share;
-            tell(done)?;
-            continue;
-        };
-        let larger = usize::from(nodes[1].tets() > nodes[0].tets());
-        let cut = [larger, 1 - larger].into_iter().find_map(|side| Some((side, nodes[side].halves(&sources[side])?)));
-        let Some((side, halves)) = cut else {
-            let tets = nodes[0].tets() + nodes[1].tets();
-            let refused = Refused { gpu, sources: &sources, beside: PER_TET * tets as u64 + RESERVE, may: ANYWHERE };
-            return Err(refused.error(tets, need, why));
-        };
-        for half in halves {
-            let mut next = nodes.clone();
-            next[side] = half.clone();
-            waiting.push((next, share / 2.0));
+        let work = || visit(gpu, &sources, &nodes, &mut placed, &mut all, cost);
+        match if meet(&sources, &nodes, apart) { work_or_cut(gpu, &sources, &nodes, work)? } else { None } {
+            None => {
+                done += share;
+                tell(done)?;
+            }
+            Some(halves) => waiting.extend(halves.map(|nodes| (nodes, share / 2.0))),
         }
     }
-    tell(1.0)?;
     let overlap = &mut all.overlap;
     for set in [&mut overlap.a, &mut overlap.b] {
         set.sort_unstable();
@@ -133,50 +117,60 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progr
         found.sort_unstable();
         found.dedup();
     }
-    Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(all))
+    Ok(all)
 }
 
 /// Whether the cells of two blocks are near enough for their contents to touch.
-fn meet(sources: &[Source<'_>; 2], nodes: &[Rc<Node>; 2], apart: f64) -> bool {
+fn meet(sources: &[Source<'_>; 2], nodes: &Pair, apart: f64) -> bool {
     let bounds = [0, 1].map(|i| nodes[i].block.bounds(&sources[i]));
     let [Some([a_lo, a_hi]), Some([b_lo, b_hi])] = bounds else { return false };
     (0..3).all(|c| a_lo[c] <= b_hi[c] + apart && b_lo[c] <= a_hi[c] + apart)
 }
 
-/// The overlap of two blocks, in ids of the whole meshes. A block that is already in device memory is reused.
+/// Does the work on two blocks. If they do not fit, cuts the larger one, or else the other one, and returns the pairs
+/// that its halves make.
+fn work_or_cut(gpu: &Gpu, sources: &[Source<'_>; 2], nodes: &Pair, work: impl FnOnce() -> Result<()>) -> Result<Option<[Pair; 2]>> {
+    let tets = nodes[0].tets() + nodes[1].tets();
+    let search = PER_TET * tets as u64;
+    let mut need = search;
+    for (node, source) in nodes.iter().zip(sources) {
+        need = need.saturating_add(node.block.bytes(gpu, &source.options)?);
+    }
+    let larger = usize::from(nodes[1].tets() > nodes[0].tets());
+    let with = |side: usize, half: &Rc<Node>| [0, 1].map(|i| if i == side { half } else { &nodes[i] }.clone());
+    let halve = |side: usize| Some(nodes[side].halves(&sources[side])?.each_ref().map(|half| with(side, half)));
+    let cutter = Cutter { gpu, sources: sources.each_ref(), beside: search + RESERVE, may: ANYWHERE };
+    cutter.work_or_cut(need, tets, work, || halve(larger).or_else(|| halve(1 - larger)))
+}
+
+/// Adds the overlap of two blocks to that of all. A block that is already in device memory is reused.
 fn visit(
     gpu: &Gpu,
     sources: &[Source<'_>; 2],
-    nodes: &[Rc<Node>; 2],
-    placed: &mut [Option<(Rc<Node>, Placed)>; 2],
-    pairs: bool,
-    took: &mut InBlocks,
-) -> Result<Overlapped> {
+    nodes: &Pair,
+    placed: &mut [Option<Placed>; 2],
+    all: &mut Overlapped,
+    cost: &mut Cost,
+) -> Result<()> {
     for (place, node) in placed.iter_mut().zip(nodes) {
-        place.take_if(|(there, _)| !Rc::ptr_eq(there, node));
+        place.take_if(|there| !there.is(&node.block));
     }
     for (place, (node, source)) in placed.iter_mut().zip(nodes.iter().zip(sources)) {
         if place.is_none() {
-            *place = Some((node.clone(), took.build(|| node.block.place(gpu, source))?));
+            *place = Some(cost.build(|| node.block.place(gpu, source))?);
         }
     }
-    let [Some((_, a)), Some((_, b))] = placed else { return Ok(Overlapped::default()) };
-    let mut found = query::overlap(&a.tree, &b.tree, pairs, SILENT)?;
+    let [Some(a), Some(b)] = placed else { return Ok(()) };
+    let Overlapped { overlap: found, times } = query::overlap(&a.tree, &b.tree, all.overlap.pairs.is_some(), SILENT)?;
     log::debug!("blocks of {} and {} tetrahedra", nodes[0].tets(), nodes[1].tets());
-    found.overlap.a.iter_mut().for_each(|t| *t = a.tet(*t));
-    found.overlap.b.iter_mut().for_each(|t| *t = b.tet(*t));
-    found.overlap.pairs.iter_mut().flatten().for_each(|[s, t]| (*s, *t) = (a.tet(*s), b.tet(*t)));
-    Ok(found)
-}
-
-fn merge(all: &mut Overlapped, found: Overlapped) {
-    all.times.add(found.times);
-    all.overlap.a.extend(found.overlap.a);
-    all.overlap.b.extend(found.overlap.b);
+    all.times.add(times);
+    all.overlap.a.extend(found.a.into_iter().map(|t| a.tet(t)));
+    all.overlap.b.extend(found.b.into_iter().map(|t| b.tet(t)));
     if let Some(pairs) = &mut all.overlap.pairs {
-        pairs.extend(found.overlap.pairs.into_iter().flatten());
+        pairs.extend(found.pairs.into_iter().flatten().map(|[s, t]| [a.tet(s), b.tet(t)]));
     }
-    for (sum, effort) in all.overlap.effort.iter_mut().zip(&found.overlap.effort) {
+    for (sum, effort) in all.overlap.effort.iter_mut().zip(&found.effort) {
         sum.add(effort);
     }
+    Ok(())
 }

@@ -3,8 +3,7 @@
 //! the block that has its cell. Between blocks, rays are in host memory.
 
 use super::cut::{Block, Placed, Source};
-use super::size::least_bytes;
-use super::{InBlocks, Refused, Tried, check_field, pieces, smaller, try_block, unless_too_large};
+use super::{Cost, Cutter};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::Grid;
@@ -16,7 +15,6 @@ use crate::render::{PicturePlan, Prepared, RayGrid, RenderSettings, RenderStats,
 use crate::times::StageTimes;
 use rayon::prelude::*;
 use std::ops::Range;
-use std::slice::from_ref;
 
 /// Bytes of device memory that rendering takes beside a block, at the least: for each column of the picture (of which
 /// it draws a strip at a time), and in addition.
@@ -45,34 +43,40 @@ pub struct Picture {
     pub prepared: Prepared,
 }
 
-/// Renders a picture as [`query::render`] does, within `memory` bytes of device memory. `report` receives the number of
-/// rays done and of all; for a mesh in blocks, how many millionths of the work are done, and a million.
+/// Renders a picture as [`query::render`] does, within the memory limit of `gpu`. `report` receives the number of rays
+/// done and of all; for a mesh in blocks, how many millionths of the work are done, and a million.
 ///
 /// # Errors
 /// Those of [`query::render`], [`Prepared::new`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the
 /// sizes if the memory is too small for the smallest blocks.
-pub fn render(gpu: &Gpu, memory: u64, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<InBlocks<Picture>> {
+pub fn render(gpu: &Gpu, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<(Picture, Cost)> {
+    let RenderRequest { mesh, ref options, field, .. } = *asked;
+    field.on.check(&field.values, [mesh.points.len(), mesh.tets.len()])?;
+    let mut cost = Cost::default();
+    let whole = cost.whole(gpu, mesh, options, |placed| render_whole(placed, asked, report))?;
+    let picture = if let Some(picture) = whole { picture } else { render_in_blocks(gpu, asked, report, &mut cost)? };
+    Ok((picture, cost.with_peak(gpu)))
+}
+
+fn render_whole(placed: &Placed, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<Picture> {
+    let (Placed { mesh, tree, .. }, RenderRequest { field, settings, .. }) = (placed, asked);
+    let prepared = query::prepare_picture(mesh, asked.mesh, field, settings)?;
+    let rendered = query::render(tree, &prepared.plan, (&field.values, field.on), Some(&prepared.normals), report)?;
+    Ok(Picture { rendered, prepared })
+}
+
+fn render_in_blocks(gpu: &Gpu, asked: &RenderRequest<'_>, report: Progress<'_>, cost: &mut Cost) -> Result<Picture> {
     let RenderRequest { mesh, ref options, field, settings } = *asked;
-    check_field(mesh, Some((&field.values, field.on)))?;
-    let gpu = &gpu.with_memory(memory);
-    let mut took = InBlocks::default();
-    if least_bytes(gpu, mesh, options)? <= memory {
-        let placed = took.place(gpu, mesh, options, 0);
-        if let Some(picture) = unless_too_large(placed.and_then(|placed| render_whole(&placed, asked, report)))? {
-            return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(picture));
-        }
-    }
-    let source = Source::new(mesh, options)?.within(gpu, memory)?;
-    took.bad_cells[0] = source.bad_cells();
+    let source = cost.source(gpu, mesh, options)?;
     // Light and opacity of a volume depend on which points are on the mesh surface; those of iso-surfaces do not.
     let neighbours = if settings.iso.is_empty() { source.neighbours() } else { Vec::new() };
-    let valid = ValidTets { bounds: (&source.grid).into(), neighbours: &neighbours, is_valid: &|t| source.is_valid(t) };
+    let valid = ValidTets { bounds: (&source.grid).into(), neighbours: &neighbours, is_valid: &|t| source.topology.is_valid(t) };
     let prepared = Prepared::new(settings, mesh, &valid, field)?;
     drop(neighbours);
     let mut rays = Rays::new(prepared.plan.size)?;
-    let order = Order::new(&prepared.plan, &source.grid);
+    let order = &Order::new(&prepared.plan, &source.grid);
     let (stats, times) = (RenderStats::default(), StageTimes::default());
-    let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, order, stats, times, took };
+    let mut job = Job { gpu, source: &source, field, prepared: &prepared, order, stats, times, cost };
     let mut waiting = vec![(source.whole(), 1.0)];
     let mut done = 0.0;
     while let Some((block, share)) = waiting.pop() {
@@ -84,29 +88,20 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &RenderRequest<'_>, report: Progres
             Some([near, far]) => waiting.extend([(far, share / 2.0), (near, share / 2.0)]),
         }
     }
-    let Job { stats, times, took, .. } = job;
-    let rendered = Rendered { colors: rays.colors, stats, times };
-    Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(Picture { rendered, prepared }))
-}
-
-fn render_whole(placed: &Placed, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<Picture> {
-    let (Placed { mesh, tree, .. }, RenderRequest { field, settings, .. }) = (placed, asked);
-    let prepared = query::prepare_picture(mesh, asked.mesh, field, settings)?;
-    let rendered = query::render(tree, &prepared.plan, (&field.values, field.on), Some(&prepared.normals), report)?;
+    let rendered = Rendered { colors: rays.colors, stats: job.stats, times: job.times };
     Ok(Picture { rendered, prepared })
 }
 
 /// The state of rendering a picture in blocks.
 struct Job<'a> {
     gpu: &'a Gpu,
-    memory: u64,
     source: &'a Source<'a>,
     field: &'a Field,
     prepared: &'a Prepared,
-    order: Order,
+    order: &'a Order,
     stats: RenderStats,
     times: StageTimes,
-    took: InBlocks,
+    cost: &'a mut Cost,
 }
 
 impl Job<'_> {
@@ -117,23 +112,20 @@ impl Job<'_> {
         if !met.contains(&true) {
             return Ok(None);
         }
-        let need = block.bytes(self.gpu, &self.source.options)?;
-        let Tried::TooLarge(why) = try_block(need, self.memory, || self.draw(block, &met, rays))? else { return Ok(None) };
-        let may = |axis: usize, last: u32| self.order.low_first(axis, last).is_some();
-        let Some([low, high]) = smaller(self.source, block, pieces(need, self.memory), &may) else {
-            let beside = RESERVE + PER_COLUMN * u64::from(self.prepared.plan.size[0]);
-            let refused = Refused { gpu: self.gpu, sources: from_ref(self.source), beside, may: &may };
-            return Err(refused.error(block.tets.len(), need, why));
-        };
+        let order = self.order;
+        let may = |axis: usize, last: u32| order.low_first(axis, last).is_some();
+        let beside = RESERVE + PER_COLUMN * u64::from(self.prepared.plan.size[0]);
+        let cutter = Cutter { gpu: self.gpu, sources: [self.source], beside, may: &may };
+        let Some([low, high]) = cutter.work_or_halve(block, || self.draw(block, &met, rays))? else { return Ok(None) };
         let finest = low.cells.finest(self.source.level).hi;
         let axis = (0..3).find(|&c| low.cells.hi[c] < high.cells.lo[c]).unwrap_or(0);
-        Ok(Some(if self.order.low_first(axis, finest[axis]) == Some(false) { [high, low] } else { [low, high] }))
+        Ok(Some(if order.low_first(axis, finest[axis]) == Some(false) { [high, low] } else { [low, high] }))
     }
 
     /// Renders a block's part of the picture. Work that was done before a failure is not repeated by the block's parts.
     fn draw(&mut self, block: &Block, met: &[bool], rays: &mut Rays) -> Result<()> {
         let (Field { values, on, .. }, Prepared { plan, normals, .. }) = (self.field, self.prepared);
-        let placed = self.took.build(|| block.place(self.gpu, self.source))?;
+        let placed = self.cost.build(|| block.place(self.gpu, self.source))?;
         let (values, normals) = (placed.values(values, *on), (!normals.is_empty()).then(|| placed.values(normals, On::Points)));
         let canvas = Canvas::new(self.gpu, &(&placed.tree).into(), plan, (&values, *on), normals.as_deref(), true)?;
         let (stats, times) = canvas.draw_part(block.cells.finest(self.source.level), met, rays)?;

@@ -4,8 +4,7 @@
 //! since a tree takes longer than a layer.
 
 use super::cut::{Block, Placed, Source};
-use super::size::least_bytes;
-use super::{ANYWHERE, InBlocks, Refused, Tried, check_field, pieces, smaller, try_block, unless_too_large};
+use super::{ANYWHERE, Cost, Cutter};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh};
@@ -18,8 +17,6 @@ use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, Vox
 use crate::times::StageTimes;
 use rayon::prelude::*;
 use std::cell::Cell;
-use std::rc::Rc;
-use std::slice::from_ref;
 
 /// Voxels that share the trees of a mesh in blocks; each takes 9 bytes of host memory.
 const BATCH: u64 = 1 << 24;
@@ -42,7 +39,7 @@ pub struct SliceRequest<'a> {
     pub extrapolate: Extrapolate,
 }
 
-/// Slices a mesh as [`query::slice`] does, within `memory` bytes of device memory. Passes the voxels to `sink` band by
+/// Slices a mesh as [`query::slice`] does, within the memory limit of `gpu`. Passes the voxels to `sink` band by
 /// band, in order. `report` receives the number of voxels done, and of all.
 ///
 /// # Errors
@@ -50,16 +47,14 @@ pub struct SliceRequest<'a> {
 /// is too small for the smallest blocks.
 pub fn slice(
     gpu: &Gpu,
-    memory: u64,
     asked: &SliceRequest<'_>,
     report: Progress<'_>,
     sink: &mut dyn FnMut(Band) -> Result<()>,
-) -> Result<InBlocks<Sliced>> {
+) -> Result<(Sliced, Cost)> {
     let SliceRequest { mesh, ref options, field, voxels, extrapolate } = *asked;
     let values = field.map(|f| (f.values.as_slice(), f.on));
-    check_field(mesh, values)?;
-    let gpu = &gpu.with_memory(memory);
-    let mut took = InBlocks::default();
+    field.map_or(Ok(()), |f| f.on.check(&f.values, [mesh.points.len(), mesh.tets.len()]))?;
+    let mut cost = Cost::default();
     let tally = Cell::new(Tally::default());
     let mut sink = |band: Band| {
         let mut sum = tally.get();
@@ -67,37 +62,33 @@ pub fn slice(
         tally.set(sum);
         sink(band)
     };
-    if least_bytes(gpu, mesh, options)? <= memory {
-        let whole = took.place(gpu, mesh, options, 0);
-        let sliced = whole.and_then(|Placed { tree, .. }| query::slice(&tree, values, voxels, extrapolate, report, &mut sink));
+    let whole = cost.whole(gpu, mesh, options, |placed| {
+        let sliced = query::slice(&placed.tree, values, voxels, extrapolate, report, &mut sink);
         // Once the sink has voxels, it is too late to begin again.
-        let sliced = if tally.get() == Tally::default() { unless_too_large(sliced)? } else { Some(sliced?) };
-        if let Some(sliced) = sliced {
-            return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(sliced));
-        }
+        if tally.get() == Tally::default() { sliced.map(Ok) } else { Ok(sliced) }
+    })?;
+    if let Some(sliced) = whole {
+        return Ok((sliced?, cost.with_peak(gpu)));
     }
-    let source = Source::new(mesh, options)?.within(gpu, memory)?;
-    took.bad_cells[0] = source.bad_cells();
+    let source = cost.source(gpu, mesh, options)?;
     voxels.check_over(&source.grid)?;
     let (blocks, times) = (vec![source.whole()], StageTimes::default());
-    let mut job = Job { gpu, memory, asked, source: &source, blocks, placed: None, took, times, done: 0.0, report };
+    let mut job = Job { gpu, asked, source: &source, blocks, placed: None, cost, times, done: 0.0, report };
     for rows in bands(voxels, BATCH) {
         sink(job.batch(rows)?)?;
     }
-    let took = InBlocks { peak: gpu.memory_peak(), ..job.took };
-    Ok(took.with(Sliced { tally: tally.get(), times: job.times }))
+    Ok((Sliced { tally: tally.get(), times: job.times }, job.cost.with_peak(gpu)))
 }
 
 /// The state of slicing a stack in blocks.
 struct Job<'a> {
     gpu: &'a Gpu,
-    memory: u64,
     asked: &'a SliceRequest<'a>,
     source: &'a Source<'a>,
     /// The blocks that the mesh is cut into so far; the last one may be in device memory.
     blocks: Vec<Block>,
-    placed: Option<(Rc<Vec<u32>>, Placed)>,
-    took: InBlocks,
+    placed: Option<Placed>,
+    cost: Cost,
     times: StageTimes,
     /// Voxels done, counted in part while only some of the blocks have been queried.
     done: f64,
@@ -118,22 +109,18 @@ impl Job<'_> {
         let mut waiting: Vec<(Block, f64)> = blocks.into_iter().map(|block| (block, share)).collect();
         let [row, layer] = rows.row(0, voxels.size[1]);
         log::debug!("slice: {} rows from row {row} of layer {layer} on, after {begun} voxels", rows.count);
+        let beside = RESERVE + PER_ROW_VOXEL * u64::from(voxels.size[0]);
+        let cutter = Cutter { gpu: self.gpu, sources: [self.source], beside, may: ANYWHERE };
         while let Some((block, share)) = waiting.pop() {
             let met = block.bounds(self.source).is_some_and(|bounds| voxels.meets(rows, bounds, &self.source.grid));
-            let need = block.bytes(self.gpu, &self.source.options)?;
-            let tried = if met { try_block(need, self.memory, || self.visit(&block, &mut all))? } else { Tried::Done };
-            let Tried::TooLarge(why) = tried else {
-                self.done += share;
-                (self.report)(self.done as u64, voxels.voxels())?;
-                self.blocks.push(block);
-                continue;
-            };
-            let Some([low, high]) = smaller(self.source, &block, pieces(need, self.memory), ANYWHERE) else {
-                let beside = RESERVE + PER_ROW_VOXEL * u64::from(voxels.size[0]);
-                let refused = Refused { gpu: self.gpu, sources: from_ref(self.source), beside, may: ANYWHERE };
-                return Err(refused.error(block.tets.len(), need, why));
-            };
-            waiting.extend([(high, share / 2.0), (low, share / 2.0)]);
+            match if met { cutter.work_or_halve(&block, || self.visit(&block, &mut all))? } else { None } {
+                None => {
+                    self.done += share;
+                    (self.report)(self.done as u64, voxels.voxels())?;
+                    self.blocks.push(block);
+                }
+                Some([low, high]) => waiting.extend([(high, share / 2.0), (low, share / 2.0)]),
+            }
         }
         self.done = end;
         Ok(all)
@@ -143,12 +130,12 @@ impl Job<'_> {
     fn visit(&mut self, block: &Block, all: &mut Band) -> Result<()> {
         let SliceRequest { field, voxels, extrapolate, .. } = *self.asked;
         let (grid, level) = (&self.source.grid, self.source.level);
-        self.placed.take_if(|(tets, _)| !Rc::ptr_eq(tets, &block.tets));
-        if self.placed.is_none() {
-            let placed = self.took.build(|| block.place(self.gpu, self.source))?;
-            self.placed = Some((block.tets.clone(), placed));
-        }
-        let (Some((_, placed)), Some(bounds)) = (&self.placed, block.bounds(self.source)) else { return Ok(()) };
+        self.placed.take_if(|there| !there.is(block));
+        let placed = match &mut self.placed {
+            Some(placed) => placed,
+            none => none.insert(self.cost.build(|| block.place(self.gpu, self.source))?),
+        };
+        let Some(bounds) = block.bounds(self.source) else { return Ok(()) };
         let here = field.map(|f| (placed.values(&f.values, f.on), f.on));
         let here = here.as_ref().map(|(values, on)| (&values[..], *on));
         let tree = &placed.tree;

@@ -32,29 +32,23 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|v| v.to_bits()).collect()
 }
 
-fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance, method, on): (f32, LocateMethod, On)) -> u32 {
+fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, how: LocateOptions) {
     let points = points(mesh, 3);
-    let how = LocateOptions { tolerance, method };
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(gpu, &device, options).unwrap();
     let asked = LocateRequest { mesh, options: *options, points: &points };
-    let mut most = 0;
-    for field in mesh.fields.iter().filter(|f| f.on == on) {
-        let field = (&field.values[..], field.on);
-        let whole = query::locate(&tree, &points, Some(field), &how, SILENT).unwrap();
-        let found = locate(gpu, memory, &asked, Some(field), &how, SILENT).unwrap();
-        let first = (0..points.len()).find(|&i| found.answer.owners[i] != whole.owners[i]);
-        let first = first.map(|i| (points[i], found.answer.owners[i], whole.owners[i]));
-        assert_eq!(first, None, "{options:?}");
-        assert_eq!(bits(found.answer.barycentrics.as_flattened()), bits(whole.barycentrics.as_flattened()));
-        assert_eq!(bits(&found.answer.values), bits(&whole.values));
-        assert!(found.peak <= memory && found.peak > memory / 4, "{} of {memory} bytes", found.peak);
-        assert!(found.bad_cells == [device.status().bad, 0] && found.bad_cells[0] > 0, "{:?}", found.bad_cells);
-        println!("{} tetrahedra, {memory} bytes: {} trees, peak {}", mesh.tets.len(), found.trees, found.peak);
-        most = most.max(found.trees);
-    }
+    let whole = query::locate(&tree, &points, None, &how, SILENT).unwrap();
+    let (found, took) = locate(&gpu.with_memory(memory), &asked, &how, SILENT).unwrap();
+    let first = (0..points.len()).find(|&i| found.owners[i] != whole.owners[i]);
+    let first = first.map(|i| (points[i], found.owners[i], whole.owners[i]));
+    assert_eq!(first, None, "{options:?}");
+    assert_eq!(bits(found.barycentrics.as_flattened()), bits(whole.barycentrics.as_flattened()));
+    assert!(took.peak <= memory && took.peak > memory / 4, "{} of {memory} bytes", took.peak);
+    assert!(took.bad_cells == [device.status().bad, 0] && took.bad_cells[0] > 0, "{:?}", took.bad_cells);
+    assert!(took.trees > 4, "{} trees", took.trees);
+    println!("{} tetrahedra, {memory} bytes: {} trees, peak {}", mesh.tets.len(), took.trees, took.peak);
     let whole = query::locate_all(&tree, &points, how.tolerance, SILENT).unwrap();
-    assert_eq!(locate_all(gpu, memory, &asked, tolerance, SILENT).unwrap().answer.owners, whole.owners);
+    assert_eq!(locate_all(&gpu.with_memory(memory), &asked, how.tolerance, SILENT).unwrap().0.owners, whole.owners);
     for within in [0.7, f32::INFINITY] {
         let whole = query::nearest(&tree, &points, within, SILENT).unwrap();
         let told = RefCell::new(Vec::new());
@@ -62,15 +56,14 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
             told.borrow_mut().push((done, all));
             Ok(())
         };
-        let found = nearest(gpu, memory, &asked, within, &report).unwrap();
+        let (found, took) = nearest(&gpu.with_memory(memory), &asked, within, &report).unwrap();
         // Every block is asked about every point, so the first block is no more than a part of the work.
         assert!(told.borrow()[0].0 < points.len() as u64 / 2, "{told:?}");
         rises(&told, points.len() as u64);
-        assert!(found.answer.owners == whole.owners && found.answer.barycentrics == whole.barycentrics && found.trees > 4);
-        assert_eq!(bits(&found.answer.distances()), bits(&whole.distances()));
+        assert!(found.owners == whole.owners && found.barycentrics == whole.barycentrics && took.trees > 4);
+        assert_eq!(bits(&found.distances()), bits(&whole.distances()));
         assert!(whole.owners.iter().filter(|&&owner| owner != u32::MAX).count() > 500);
     }
-    most
 }
 
 /// A grid with fields on points and cells, and with bad cells.
@@ -105,13 +98,11 @@ fn answers_are_those_of_the_whole() {
 }
 
 fn located(gpu: &Gpu, mesh: &Mesh) {
-    for (alpha, assign, lists, how) in [
-        (0.0, Assign::Aabb, Lists::Boundary, (1e-5, LocateMethod::Sorted, On::Points)),
-        (1.0, Assign::Aabb, Lists::All, (0.01, LocateMethod::Runs, On::Cells)),
-    ] {
+    for (alpha, assign, lists, tolerance, method) in
+        [(0.0, Assign::Aabb, Lists::Boundary, 1e-5, LocateMethod::Sorted), (1.0, Assign::Aabb, Lists::All, 0.01, LocateMethod::Runs)]
+    {
         let options = BuildOptions { alpha, assign, lists, ..BuildOptions::default() };
-        let trees = check(gpu, mesh, &options, 768 << 10, how);
-        assert!(trees > 4, "{trees} trees");
+        check(gpu, mesh, &options, 768 << 10, LocateOptions { tolerance, method });
     }
 }
 
@@ -120,40 +111,41 @@ fn refused(gpu: &Gpu, mesh: &Mesh) {
     let options = BuildOptions::default();
     let points = points(mesh, 100);
     let asked = LocateRequest { mesh, options, points: &points };
-    let found = locate(gpu, 64 << 20, &asked, None, &LocateOptions::default(), SILENT).unwrap();
-    assert_eq!((found.trees, found.bad_cells), (1, [mesh.tets.len().div_ceil(997) as u32, 0]));
-    let refused = locate(gpu, 1 << 14, &asked, None, &LocateOptions::default(), SILENT).unwrap_err();
+    let (_, took) = locate(&gpu.with_memory(64 << 20), &asked, &LocateOptions::default(), SILENT).unwrap();
+    assert_eq!((took.trees, took.bad_cells), (1, [mesh.tets.len().div_ceil(997) as u32, 0]));
+    let refused = locate(&gpu.with_memory(1 << 14), &asked, &LocateOptions::default(), SILENT).unwrap_err();
     assert!(matches!(&refused, Error::TooLarge(why) if why.contains("16384 bytes")), "{refused}");
     // Blocks as small as these are not cut, so they are asked for few points at a time.
     let small = kuhn_jittered([3; 3], 0.1, 1).unwrap();
     let points: Vec<[f32; 3]> = (0..20_000).map(|i| [i as f32 * 1.5e-4, 1.5, 1.5]).collect();
     let asked = LocateRequest { mesh: &small, options, points: &points };
-    let found = locate(gpu, 200 << 10, &asked, None, &LocateOptions::default(), SILENT).unwrap();
-    assert!(found.trees == 1 && !found.answer.owners.contains(&u32::MAX), "{} trees", found.trees);
+    let (found, took) = locate(&gpu.with_memory(200 << 10), &asked, &LocateOptions::default(), SILENT).unwrap();
+    assert!(took.trees == 1 && !found.owners.contains(&u32::MAX), "{} trees", took.trees);
 }
 
 /// Of a mesh with tetrahedra of very different sizes, the memory that a refusal names is enough for every query.
 fn remedied(gpu: &Gpu) {
+    type Query<'a> = &'a dyn Fn(&Gpu) -> olbvh::Result<u32>;
     let graded = olbvh::mesh::graded(18).unwrap();
     let (mesh, options, field) = (&graded, BuildOptions { fineness: Fineness::Points, ..BuildOptions::default() }, &graded.fields[0]);
     let points = points(mesh, 10);
     let settings = RenderSettings { size: [300, 20], ..RenderSettings::default() };
     let voxels = &SliceSettings { size: [500, 0], ..SliceSettings::default() }.voxels([0.0; 3], [1.0; 3], [0.0; 3]).unwrap();
-    let queries: [&dyn Fn(u64) -> olbvh::Result<u32>; 4] = [
-        &|memory| Ok(locate(gpu, memory, &LocateRequest { mesh, options, points: &points }, None, &LocateOptions::default(), SILENT)?.trees),
-        &|memory| Ok(render(gpu, memory, &RenderRequest { mesh, options, field, settings: &settings }, SILENT)?.trees),
-        &|memory| {
+    let queries: [Query<'_>; 4] = [
+        &|gpu| Ok(locate(gpu, &LocateRequest { mesh, options, points: &points }, &LocateOptions::default(), SILENT)?.1.trees),
+        &|gpu| Ok(render(gpu, &RenderRequest { mesh, options, field, settings: &settings }, SILENT)?.1.trees),
+        &|gpu| {
             let asked = SliceRequest { mesh, options, field: Some(field), voxels, extrapolate: Extrapolate::Nearest };
-            Ok(slice(gpu, memory, &asked, SILENT, &mut |_| Ok(()))?.trees)
+            Ok(slice(gpu, &asked, SILENT, &mut |_| Ok(()))?.1.trees)
         },
-        &|memory| Ok(overlap(gpu, memory, &OverlapRequest { meshes: [mesh, mesh], options, pairs: false }, SILENT)?.trees),
+        &|gpu| Ok(overlap(gpu, &OverlapRequest { meshes: [mesh, mesh], options, pairs: false }, SILENT)?.1.trees),
     ];
     for (i, query) in queries.into_iter().enumerate() {
         for memory in [20_000, 100_000, 300_000] {
-            let Err(refused) = query(memory) else { continue };
+            let Err(refused) = query(&gpu.with_memory(memory)) else { continue };
             let said = refused.to_string();
             let enough: u64 = said.split("allow ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
-            let trees = query(enough).unwrap_or_else(|e| panic!("query {i} with {memory} bytes: {said}, but then: {e}"));
+            let trees = query(&gpu.with_memory(enough)).unwrap_or_else(|e| panic!("query {i} with {memory} bytes: {said}, but then: {e}"));
             println!("query {i} with {memory} bytes: {enough} are enough for {trees} trees");
             assert!(enough < 5 << 20 && trees > 1, "{said}");
         }
@@ -167,11 +159,11 @@ fn flat(gpu: &Gpu) {
         mesh.tets.iter().map(|ids| [0, 1, 2].map(|c| ids.iter().map(|&v| 0.25 * mesh.points[v as usize][c]).sum())).collect();
     let ask = |fineness| {
         let options = BuildOptions { fineness, ..BuildOptions::default() };
-        locate(gpu, 768 << 10, &LocateRequest { mesh: &mesh, options, points: &points }, None, &LocateOptions::default(), SILENT)
+        locate(&gpu.with_memory(768 << 10), &LocateRequest { mesh: &mesh, options, points: &points }, &LocateOptions::default(), SILENT)
     };
     assert!(matches!(ask(Fineness::Alpha), Err(Error::TooLarge(_))));
-    let found = ask(Fineness::Points).unwrap();
-    assert!(found.trees > 2 && found.answer.owners.iter().copied().eq(0..mesh.tets.len() as u32), "{} trees", found.trees);
+    let (found, took) = ask(Fineness::Points).unwrap();
+    assert!(took.trees > 2 && found.owners.iter().copied().eq(0..mesh.tets.len() as u32), "{} trees", took.trees);
 }
 
 fn overlapped(gpu: &Gpu, a: &Mesh) {
@@ -192,16 +184,16 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
         let searched = u64::from(whole.effort[0].searched) + u64::from(whole.effort[1].searched);
         rises(&told, if pairs { 2 * a.tets.len() as u64 } else { searched });
         let memory = 3 << 19;
-        let found = overlap(gpu, memory, &OverlapRequest { meshes: [a, &b], options, pairs }, &report).unwrap();
+        let (found, took) = overlap(&gpu.with_memory(memory), &OverlapRequest { meshes: [a, &b], options, pairs }, &report).unwrap();
         rises(&told, 1_000_000);
-        println!("overlap: {} trees, peak {}, {} and {}", found.trees, found.peak, whole.a.len(), whole.b.len());
-        assert!(whole.a.len() > 1000 && found.trees > 4 && found.peak <= memory);
-        assert_eq!(found.answer.overlap.a, whole.a);
-        assert_eq!(found.answer.overlap.b, whole.b);
-        assert_eq!(found.answer.overlap.pairs, whole.pairs);
+        println!("overlap: {} trees, peak {}, {} and {}", took.trees, took.peak, whole.a.len(), whole.b.len());
+        assert!(whole.a.len() > 1000 && took.trees > 4 && took.peak <= memory);
+        assert_eq!(found.overlap.a, whole.a);
+        assert_eq!(found.overlap.b, whole.b);
+        assert_eq!(found.overlap.pairs, whole.pairs);
         let bad = devices.each_ref().map(|device| device.status().bad);
-        let uncut = overlap(gpu, 64 << 20, &OverlapRequest { meshes: [a, &b], options, pairs }, SILENT).unwrap();
-        assert!(bad[0] > 0 && bad[1] == 1 && found.bad_cells == bad && (uncut.trees, uncut.bad_cells) == (2, bad), "{bad:?}");
+        let (_, uncut) = overlap(&gpu.with_memory(64 << 20), &OverlapRequest { meshes: [a, &b], options, pairs }, SILENT).unwrap();
+        assert!(bad[0] > 0 && bad[1] == 1 && took.bad_cells == bad && (uncut.trees, uncut.bad_cells) == (2, bad), "{bad:?}");
     }
 }
 
@@ -223,10 +215,10 @@ fn apart(gpu: &Gpu, a: &Mesh) {
             Ok(())
         };
         // Too little memory for the whole meshes to be tried.
-        let found = overlap(gpu, 1 << 19, &OverlapRequest { meshes: [a, &b], options, pairs }, &report).unwrap();
+        let (found, took) = overlap(&gpu.with_memory(1 << 19), &OverlapRequest { meshes: [a, &b], options, pairs }, &report).unwrap();
         rises(&told, 1_000_000);
-        assert_eq!((found.trees, found.answer.overlap.pairs), (0, wanted));
-        assert!(found.answer.overlap.a.is_empty() && found.answer.overlap.b.is_empty());
+        assert_eq!((took.trees, found.overlap.pairs), (0, wanted));
+        assert!(found.overlap.a.is_empty() && found.overlap.b.is_empty());
     }
 }
 
@@ -265,13 +257,13 @@ fn sliced(gpu: &Gpu, mesh: &Mesh) {
             gather(&mut all[1], band);
             Ok(())
         };
-        let found = slice(gpu, memory, &asked, SILENT, &mut sink).unwrap();
-        println!("{settings:?}: {whole:?}, {} trees, peak {}", found.trees, found.peak);
+        let (found, took) = slice(&gpu.with_memory(memory), &asked, SILENT, &mut sink).unwrap();
+        println!("{settings:?}: {whole:?}, {} trees, peak {}", took.trees, took.peak);
         let first = (0..all[0].len()).find(|&i| all[0].get(i) != all[1].get(i));
         assert_eq!(first.map(|i| (i, all[0][i], all[1].get(i).copied())), None, "{settings:?}");
-        assert!(whole.inside > 100 && whole.touched > 50 && found.answer.tally == whole, "{whole:?}");
-        assert!(found.trees > 2 && found.peak <= memory, "{} trees, {} bytes", found.trees, found.peak);
-        assert_eq!(found.bad_cells, [device.status().bad, 0]);
+        assert!(whole.inside > 100 && whole.touched > 50 && found.tally == whole, "{whole:?}");
+        assert!(took.trees > 2 && took.peak <= memory, "{} trees, {} bytes", took.trees, took.peak);
+        assert_eq!(took.bad_cells, [device.status().bad, 0]);
     }
 }
 
@@ -290,12 +282,13 @@ fn far(gpu: &Gpu, mesh: &Mesh) {
                 owners.extend(band.owners);
                 Ok(())
             };
-            (slice(gpu, memory, &asked, SILENT, &mut sink).unwrap(), owners)
+            let (sliced, took) = slice(&gpu.with_memory(memory), &asked, SILENT, &mut sink).unwrap();
+            (sliced.tally, took.trees, owners)
         };
-        let (whole, owners) = of(64 << 20);
-        let (found, in_blocks) = of(640 << 10);
-        assert!(whole.trees == 1 && whole.answer.tally.inside > 500 && found.trees > 1, "{whole:?}, {found:?}");
-        assert!(whole.answer.tally == found.answer.tally && owners == in_blocks, "{:?}, in blocks {:?}", whole.answer, found.answer);
+        let (whole, one, owners) = of(64 << 20);
+        let (found, some, in_blocks) = of(640 << 10);
+        assert!(one == 1 && whole.inside > 500 && some > 1, "{whole:?}, {one} and {some} trees");
+        assert!(whole == found && owners == in_blocks, "{whole:?}, in blocks {found:?}");
     }
 }
 
@@ -308,10 +301,10 @@ fn passed_over(gpu: &Gpu) {
         let settings = SliceSettings { at: Some(at), thickness: Some(0.5), size: [20, 20], ..SliceSettings::default() };
         let voxels = &settings.voxels([0.0; 3], [14.0, 13.0, 12.0], mesh.origin).unwrap();
         let asked = SliceRequest { mesh: &mesh, options: BuildOptions::default(), field: None, voxels, extrapolate: Extrapolate::Nearest };
-        slice(gpu, 1 << 20, &asked, SILENT, &mut |_| Ok(()))
+        slice(&gpu.with_memory(1 << 20), &asked, SILENT, &mut |_| Ok(()))
     };
-    let below = ask(2.0).unwrap();
-    assert!(below.trees > 1 && below.answer.tally.inside > 300, "{below:?}");
+    let (below, took) = ask(2.0).unwrap();
+    assert!(took.trees > 1 && below.tally.inside > 300, "{below:?}, {took:?}");
     assert!(matches!(ask(11.5), Err(Error::TooLarge(_))));
 }
 
@@ -341,11 +334,11 @@ fn drawn(gpu: &Gpu, mesh: &Mesh) {
         };
         let options = BuildOptions::default();
         let asked = RenderRequest { mesh, options, field: wave, settings: &settings };
-        let (whole, took) = render(gpu, 64 << 20, &asked, SILENT).unwrap().into_parts();
+        let (whole, took) = render(&gpu.with_memory(64 << 20), &asked, SILENT).unwrap();
         let bad = took.bad_cells;
         assert!(took.trees == 1 && bad[0] > 0);
         let memory = 384 << 10;
-        let (found, took) = render(gpu, memory, &asked, SILENT).unwrap().into_parts();
+        let (found, took) = render(&gpu.with_memory(memory), &asked, SILENT).unwrap();
         println!("{camera}: {} samples, {} trees, peak {}", found.rendered.stats.found_samples, took.trees, took.peak);
         let first = (0..whole.rendered.colors.len()).find(|&i| bits(&whole.rendered.colors[i]) != bits(&found.rendered.colors[i]));
         assert_eq!(first.map(|i| (i % 41, i / 41, whole.rendered.colors[i], found.rendered.colors[i])), None, "{camera}");
@@ -364,7 +357,7 @@ fn hidden(gpu: &Gpu, mesh: &Mesh) {
         let clips = clips.iter().map(|clip| clip.parse().unwrap()).collect();
         let settings = RenderSettings { size: [41, 33], transfer, clips, ..RenderSettings::default() };
         let asked = RenderRequest { mesh, options: BuildOptions::default(), field: &field, settings: &settings };
-        let (picture, took) = render(gpu, memory, &asked, SILENT).unwrap().into_parts();
+        let (picture, took) = render(&gpu.with_memory(memory), &asked, SILENT).unwrap();
         (picture.rendered.colors.iter().map(|c| bits(c)).collect::<Vec<_>>(), took.trees)
     };
     let everything = vec![(0.0, 0.3), (1.0, 0.5)];
@@ -457,7 +450,7 @@ fn crowded_vertices_are_known_to_every_block() {
         owners[1].extend(band.owners);
         Ok(())
     };
-    let found = slice(gpu, 440_000, &asked, SILENT, &mut sink).unwrap();
+    let (found, took) = slice(&gpu.with_memory(440_000), &asked, SILENT, &mut sink).unwrap();
     let other = (0..owners[0].len()).filter(|&i| owners[0][i] != owners[1][i]).count();
-    assert!(found.trees > 2 && found.answer.tally.inside > 10_000 && other == 0, "{} trees: {other} other owners", found.trees);
+    assert!(took.trees > 2 && found.tally.inside > 10_000 && other == 0, "{} trees: {other} other owners", took.trees);
 }

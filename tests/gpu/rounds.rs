@@ -71,7 +71,6 @@ fn calls_can_be_cancelled() {
     };
     let held = || gpu.allocated().unwrap().total_allocated_bytes;
     let before = held();
-    let memory = 1 << 30;
     let how = LocateOptions::default();
     let options = BuildOptions::default();
     let asked = blocks::LocateRequest { mesh: &mesh, options, points: &mesh.points };
@@ -82,7 +81,7 @@ fn calls_can_be_cancelled() {
         ("overlap", query::overlap(&tree, &tree, false, &enough).map(drop)),
         ("pairs", query::overlap(&tree, &whole, true, &enough).map(drop)),
         ("slice", query::slice(&tree, None, &voxels, Extrapolate::Nearest, &enough, &mut |_| Ok(())).map(drop)),
-        ("blocks", blocks::locate(&gpu, memory, &asked, None, &how, &enough).map(drop)),
+        ("blocks", blocks::locate(&gpu.with_memory(1 << 30), &asked, &how, &enough).map(drop)),
         ("render", {
             let plan = query::prepare_picture(&device, &mesh, field, &settings).unwrap();
             query::render(&tree, &plan.plan, (&field.values, field.on), Some(&plan.normals), &enough).map(drop)

@@ -7,7 +7,7 @@ mod shapes;
 pub use shapes::{Origin, Shapes};
 
 use crate::common::{Common, Failure, Outcome};
-use olbvh::blocks::{InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
+use olbvh::blocks::{Cost, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Bounds, Fault, Mesh};
@@ -23,8 +23,7 @@ pub type OnProgress<'a> = &'a (dyn Fn(u64, u64) -> Result<()> + Sync);
 /// Receives the bands of a stack of slices.
 pub type Sink<'a> = &'a mut dyn FnMut(Band) -> Result<()>;
 
-/// Builds and queries trees. `memory`, where a query takes it, is the maximum number of bytes of device memory to use;
-/// `None`: all the device has.
+/// Builds and queries trees.
 pub trait Engine {
     /// The name of the engine in results.
     fn name(&self) -> String;
@@ -33,29 +32,17 @@ pub trait Engine {
     /// Marks the boundary, builds the tree, and reports the properties of both.
     fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary>;
     /// Builds a tree over a mesh and finds the owner and barycentric coordinates of each point.
-    fn locate(
-        &self,
-        asked: &LocateRequest<'_>,
-        how: &LocateOptions,
-        memory: Option<u64>,
-        report: OnProgress<'_>,
-    ) -> Result<InBlocks<Located>>;
+    fn locate(&self, asked: &LocateRequest<'_>, how: &LocateOptions, report: OnProgress<'_>) -> Result<(Located, Cost)>;
     /// Builds a tree over a mesh and finds every tetrahedron that contains each point.
-    fn locate_all(
-        &self,
-        asked: &LocateRequest<'_>,
-        tolerance: f32,
-        memory: Option<u64>,
-        report: OnProgress<'_>,
-    ) -> Result<InBlocks<AllOwners>>;
+    fn locate_all(&self, asked: &LocateRequest<'_>, tolerance: f32, report: OnProgress<'_>) -> Result<(AllOwners, Cost)>;
     /// Builds a tree over a mesh and finds the place of its surface that is closest to each point, at most `within` away.
-    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>>;
+    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, report: OnProgress<'_>) -> Result<(Nearest, Cost)>;
     /// Builds a tree over each of two meshes and finds where they overlap.
-    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlapped>>;
+    fn overlap(&self, asked: &OverlapRequest<'_>, report: OnProgress<'_>) -> Result<(Overlapped, Cost)>;
     /// Builds a tree over a mesh and draws a field.
-    fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>>;
+    fn render(&self, asked: &RenderRequest<'_>, report: OnProgress<'_>) -> Result<(Picture, Cost)>;
     /// Builds a tree over a mesh and slices it, band by band into `sink`.
-    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Sliced>>;
+    fn slice(&self, asked: &SliceRequest<'_>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<(Sliced, Cost)>;
 }
 
 /// Figures about a mesh and its tree.
@@ -98,7 +85,7 @@ pub fn device(common: &Common) -> Outcome<(Gpu, Shapes)> {
     if common.means_cpu() {
         return Err(Failure::Usage("--device cpu: only Vulkan devices are measured".into()));
     }
-    let (gpu, shapes) = gpu::Device::open(common)?.into_parts();
+    let (gpu, shapes) = gpu::Device::open(common, None)?.into_parts();
     // Measurements are repeated, so the pool keeps the memory of one repetition for the next.
     Ok((gpu.with_pool(gpu.report().memory / 4), shapes))
 }
@@ -109,10 +96,16 @@ pub fn shapes(common: &Common) -> Outcome<Shapes> {
     Shapes::of(common, gpu.report())
 }
 
-/// Opens the engine that `--device` names; without the option, the best Vulkan device.
-pub fn open(common: &Common) -> Outcome<Box<dyn Engine>> {
+/// Opens the engine that `--device` names; without the option, the best Vulkan device. Each query may use `memory`
+/// bytes of it; `None`: all it has.
+pub fn open(common: &Common, memory: Option<u64>) -> Outcome<Box<dyn Engine>> {
     if !common.means_cpu() {
-        return Ok(Box::new(gpu::Device::open(common)?));
+        return Ok(Box::new(gpu::Device::open(common, memory)?));
+    }
+    if memory.is_some() {
+        return Err(Failure::Usage(
+            "--memory: a limit of device memory; --device cpu works in the host's memory, on the whole mesh".into(),
+        ));
     }
     if common.target.is_some() {
         return Err(Failure::Usage("--target: tuning parameters of kernels, which --device cpu does not have".into()));

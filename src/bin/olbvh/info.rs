@@ -38,7 +38,7 @@ pub struct Args {
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let options = args.tree.options()?;
-    let engine = engine::open(common)?;
+    let engine = engine::open(common, None)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let progress = Progress::new(common, "building");
     let summary = engine.summary(&loaded.mesh, &options)?;

@@ -5,7 +5,7 @@ use crate::engine::{self, Engine, OnProgress};
 use crate::input::{self, MemoryArgs, TreeArgs, WarpArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{counted, grouped, in_blocks, milliseconds, single};
-use olbvh::blocks::{InBlocks, LocateRequest};
+use olbvh::blocks::{Cost, LocateRequest};
 use olbvh::formats::{
     Fate, LoadOptions, Loaded, Located, Merge, OutputFile, OutputFormat, load, load_points, read_points, without_lengths, write_json,
     write_located, write_npy,
@@ -94,7 +94,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
     let output = ResultOutput::announce(&args.output, formats, &[&args.mesh, &args.points], common)?;
     let options = args.tree.suited(Fineness::Points)?;
-    let engine = engine::open(common)?;
+    let engine = engine::open(common, args.memory.memory)?;
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;
     let mesh = &loaded.mesh;
@@ -107,15 +107,15 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let how = LocateOptions { method, tolerance: args.tolerance };
     let progress = Progress::new(common, "locating");
     let report = |done: u64, total: u64| progress.follow(done, total);
-    let (start, memory) = (Instant::now(), args.memory.memory);
+    let start = Instant::now();
     let (found, beside, took, seconds) = if args.all {
-        let (all, took) = engine.locate_all(&asked, args.tolerance, memory, &report)?.into_parts();
+        let (all, took) = engine.locate_all(&asked, args.tolerance, &report)?;
         let seconds = start.elapsed().as_secs_f64();
         (write_every_owner(&output, mesh, &all.owners)?, 0, took, seconds)
     } else {
-        let (mut located, took) = engine.locate(&asked, &how, memory, &report)?.into_parts();
+        let (mut located, took) = engine.locate(&asked, &how, &report)?;
         let found = with_owner(&located);
-        let distances = args.within.map(|within| move_beside(&*engine, &asked, &mut located, within, memory, &report)).transpose()?;
+        let distances = args.within.map(|within| move_beside(&*engine, &asked, &mut located, within, &report)).transpose()?;
         let values = columns(mesh, &fields, args.all_fields, &located, distances);
         let seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.owners.iter().map(|&tet| if tet == u32::MAX { tet } else { mesh.cell_id(tet) }).collect();
@@ -182,7 +182,7 @@ struct Done<'a> {
     /// Points outside that have a place of the surface instead.
     beside: usize,
     fields: Vec<&'a Field>,
-    took: InBlocks,
+    took: Cost,
     seconds: f64,
     device: String,
 }
@@ -239,7 +239,6 @@ fn move_beside(
     asked: &LocateRequest<'_>,
     located: &mut query::Located,
     within: f32,
-    memory: Option<u64>,
     report: OnProgress<'_>,
 ) -> Outcome<Vec<f32>> {
     let outside: Vec<usize> = (0..located.owners.len()).filter(|&i| located.owners[i] == u32::MAX).collect();
@@ -248,7 +247,7 @@ fn move_beside(
     if points.is_empty() {
         return Ok(distances);
     }
-    let (nearest, _) = engine.nearest(&LocateRequest { points: &points, ..*asked }, within, memory, report)?.into_parts();
+    let (nearest, _) = engine.nearest(&LocateRequest { points: &points, ..*asked }, within, report)?;
     for (k, (&i, distance)) in outside.iter().zip(nearest.distances()).enumerate() {
         (located.owners[i], located.barycentrics[i], distances[i]) = (nearest.owners[k], nearest.barycentrics[k], distance);
     }

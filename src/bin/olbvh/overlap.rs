@@ -7,7 +7,7 @@ use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, milliseconds};
 use glam::{DQuat, DVec3};
-use olbvh::blocks::{InBlocks, OverlapRequest};
+use olbvh::blocks::{Cost, OverlapRequest};
 use olbvh::formats::{OutputFormat, write_json, write_mesh};
 use olbvh::mesh::{Bounds, Field, Mesh, On, is_usable, valid_grid};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
@@ -59,15 +59,14 @@ pub struct Args {
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let output = ResultOutput::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b], common)?;
     let options = args.options(output.format)?;
-    let engine = engine::open(common)?;
+    let engine = engine::open(common, args.memory.memory)?;
     let a = args.tree.mesh(&args.a, common)?.mesh;
     let mut b = args.tree.mesh(&args.b, common)?.mesh;
     pose(&mut b, &a, args)?;
     let progress = Progress::new(common, "overlap");
     let asked = OverlapRequest { meshes: [&a, &b], options, pairs: args.pairs };
     let start = Instant::now();
-    let (Overlapped { overlap, .. }, took) =
-        engine.overlap(&asked, args.memory.memory, &|done, total| progress.follow(done, total))?.into_parts();
+    let (Overlapped { overlap, .. }, took) = engine.overlap(&asked, &|done, total| progress.follow(done, total))?;
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     drop(progress);
     for (path, bad) in [&args.a, &args.b].into_iter().zip(took.bad_cells) {
@@ -174,7 +173,7 @@ struct Done {
     effort: [Effort; 2],
     /// Number of tetrahedra of both meshes.
     tets: u64,
-    took: InBlocks,
+    took: Cost,
     seconds: f64,
     device: String,
 }

@@ -8,7 +8,7 @@ use crate::input::{self, MemoryArgs, TreeArgs, WarpArgs};
 use crate::legend::{Explained, Legend};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, in_blocks, milliseconds, single};
-use olbvh::blocks::{InBlocks, Picture, RenderRequest};
+use olbvh::blocks::{Cost, Picture, RenderRequest};
 use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, printable, write_png};
 use olbvh::mesh::{Field, Mesh, On};
@@ -137,7 +137,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let legend = args.legend()?;
     let mut settings = args.settings(legend.as_ref())?;
     settings.check()?;
-    let engine = engine::open(common)?;
+    let engine = engine::open(common, args.memory.memory)?;
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;
     let mesh = &loaded.mesh;
@@ -151,7 +151,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let start = Instant::now();
     let progress = Progress::new(common, "rendering");
     let asked = RenderRequest { mesh, options, field: &field, settings: &settings };
-    let (mut picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.follow(done, total))?.into_parts();
+    let (mut picture, took) = engine.render(&asked, &|done, total| progress.follow(done, total))?;
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
     if expects_something && picture.rendered.colors.iter().all(|color| color[3] < FAINT) {
@@ -188,7 +188,7 @@ struct Done {
     /// Its camera, as `--camera` takes it.
     camera: String,
     field: Field,
-    took: InBlocks,
+    took: Cost,
     seconds: f64,
     device: String,
 }

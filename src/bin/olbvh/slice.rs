@@ -8,7 +8,7 @@ use crate::output::{self, Progress};
 use crate::slice_output::{Appearance, Layers, layer_file, materials};
 use crate::slice_placement::Placement;
 use crate::text::{counted, grouped, in_blocks, milliseconds};
-use olbvh::blocks::{InBlocks, SliceRequest};
+use olbvh::blocks::{Cost, SliceRequest};
 use olbvh::formats::{OutputFormat, printable};
 use olbvh::mesh::{Bounds, Field, Mesh, On, valid_grid};
 use olbvh::options::{BuildOptions, Fineness};
@@ -109,7 +109,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = args.format()?;
     let colors = input::transfer(args.tf.as_deref().unwrap_or(DEFAULT_MAP))?;
     let options = BuildOptions { slabs: true, ..args.tree.suited(Fineness::Points)? };
-    let engine = engine::open(common)?;
+    let engine = engine::open(common, args.memory.memory)?;
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;
     let mesh = &loaded.mesh;
@@ -130,8 +130,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let start = Instant::now();
     let mut sink = |band: Band| layers.band(band);
     let asked = SliceRequest { mesh, options, field, voxels: &voxels, extrapolate: args.extrapolate };
-    let sliced = engine.slice(&asked, args.memory.memory, &|done, total| progress.follow(done, total), &mut sink)?;
-    let (Sliced { tally, .. }, took) = sliced.into_parts();
+    let (Sliced { tally, .. }, took) = engine.slice(&asked, &|done, total| progress.follow(done, total), &mut sink)?;
     layers.finish()?;
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
@@ -222,7 +221,7 @@ struct Done<'a> {
     placement: Placement,
     field: Option<&'a Field>,
     tally: Tally,
-    took: InBlocks,
+    took: Cost,
     seconds: f64,
     device: String,
 }

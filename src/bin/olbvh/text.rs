@@ -1,6 +1,6 @@
 //! Formatting of text for people.
 
-use olbvh::blocks::InBlocks;
+use olbvh::blocks::Cost;
 use std::fmt::Write as _;
 
 /// Longest label to which values are aligned; a longer label shifts only its own value.
@@ -85,8 +85,8 @@ pub fn milliseconds(ms: f64) -> String {
 }
 
 /// Text, to be appended, that says how many blocks a mesh was split into; empty if it was not split.
-pub fn in_blocks(took: &InBlocks) -> String {
-    let InBlocks { trees, peak, build_seconds, .. } = *took;
+pub fn in_blocks(took: &Cost) -> String {
+    let Cost { trees, peak, build_seconds, .. } = *took;
     if trees > 1 {
         format!("; {trees} blocks within {}, built in {}", bytes(peak), milliseconds(build_seconds * 1e3))
     } else {

@@ -1,8 +1,8 @@
 //! The engine that computes on the CPU with the reference implementation.
 
 use super::{Engine, OnProgress, Sink, Summary};
-use olbvh::blocks::{InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
-use olbvh::error::{Error, Result};
+use olbvh::blocks::{Cost, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
+use olbvh::error::Result;
 use olbvh::mesh::Mesh;
 use olbvh::options::{BuildOptions, POINT_CHUNK, POINT_CODE_BITS};
 use olbvh::query::{AllOwners, LocateMethod, LocateOptions, Located, Nearest, Overlapped, Rendered, Sliced};
@@ -65,31 +65,19 @@ impl Engine for Cpu {
         })
     }
 
-    fn locate(
-        &self,
-        asked: &LocateRequest<'_>,
-        how: &LocateOptions,
-        memory: Option<u64>,
-        report: OnProgress<'_>,
-    ) -> Result<InBlocks<Located>> {
-        on_host(asked.mesh, &asked.options, memory, |tree| tree.locate(asked.points, how, report))
+    fn locate(&self, asked: &LocateRequest<'_>, how: &LocateOptions, report: OnProgress<'_>) -> Result<(Located, Cost)> {
+        on_host(asked.mesh, &asked.options, |tree| tree.locate(asked.points, how, report))
     }
 
-    fn locate_all(
-        &self,
-        asked: &LocateRequest<'_>,
-        tolerance: f32,
-        memory: Option<u64>,
-        report: OnProgress<'_>,
-    ) -> Result<InBlocks<AllOwners>> {
-        on_host(asked.mesh, &asked.options, memory, |tree| {
+    fn locate_all(&self, asked: &LocateRequest<'_>, tolerance: f32, report: OnProgress<'_>) -> Result<(AllOwners, Cost)> {
+        on_host(asked.mesh, &asked.options, |tree| {
             let locator = Locator::new(tree.mesh, &tree.topology, &tree.tree).with_tolerance(tolerance);
             Ok(AllOwners { owners: each(asked.points, |p| locator.owners(p), report)?, ..AllOwners::default() })
         })
     }
 
-    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
-        on_host(asked.mesh, &asked.options, memory, |tree| {
+    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, report: OnProgress<'_>) -> Result<(Nearest, Cost)> {
+        on_host(asked.mesh, &asked.options, |tree| {
             let surface = Surface::new(tree.mesh, &tree.topology, &tree.tree);
             let found = each(asked.points, |p| surface.nearest(p, within).unwrap_or((Location::NOWHERE, f32::INFINITY)), report)?;
             Ok(Nearest {
@@ -102,8 +90,7 @@ impl Engine for Cpu {
         })
     }
 
-    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlapped>> {
-        no_memory(memory)?;
+    fn overlap(&self, asked: &OverlapRequest<'_>, report: OnProgress<'_>) -> Result<(Overlapped, Cost)> {
         let ([a, b], options) = (asked.meshes, &asked.options);
         let start = Instant::now();
         let (topology_a, topology_b) = (topology(a)?, topology(b)?);
@@ -115,20 +102,20 @@ impl Engine for Cpu {
         let answer = Overlapped { overlap: found, ..Overlapped::default() };
         report(1, 1)?;
         let bad_cells = [topology_a.counts.bad, topology_b.counts.bad];
-        Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds, bad_cells })
+        Ok((answer, Cost { trees: 2, peak: 0, build_seconds, bad_cells }))
     }
 
-    fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
-        on_host(asked.mesh, &asked.options, memory, |tree| {
+    fn render(&self, asked: &RenderRequest<'_>, report: OnProgress<'_>) -> Result<(Picture, Cost)> {
+        on_host(asked.mesh, &asked.options, |tree| {
             let scene = Drawing::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
             let volume::Picture { colors, stats, times, .. } = volume::render(&scene, report)?;
             Ok(Picture { rendered: Rendered { colors, stats, times }, prepared: scene.into_prepared() })
         })
     }
 
-    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Sliced>> {
+    fn slice(&self, asked: &SliceRequest<'_>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<(Sliced, Cost)> {
         let SliceRequest { field, voxels, extrapolate, .. } = *asked;
-        on_host(asked.mesh, &asked.options, memory, |tree| {
+        on_host(asked.mesh, &asked.options, |tree| {
             let slicer = Slicer::new(tree.mesh, &tree.topology, &tree.tree, field, *voxels, extrapolate)?;
             let (mut tally, mut done) = (Tally::default(), 0);
             // Bands are those of the device, so that owners are equal even where tetrahedra overlap.
@@ -144,24 +131,11 @@ impl Engine for Cpu {
     }
 }
 
-/// Refuses a limit of device memory, which has no meaning on the CPU.
-fn no_memory(memory: Option<u64>) -> Result<()> {
-    memory.map_or(Ok(()), |_| {
-        Err(Error::Invalid("--memory is that of a device; the CPU works in the host's memory, on the whole mesh".into()))
-    })
-}
-
 /// Builds the tree over the whole mesh and computes an answer with it.
-fn on_host<T>(
-    mesh: &Mesh,
-    options: &BuildOptions,
-    memory: Option<u64>,
-    answer: impl FnOnce(&CpuTree<'_>) -> Result<T>,
-) -> Result<InBlocks<T>> {
-    no_memory(memory)?;
+fn on_host<T>(mesh: &Mesh, options: &BuildOptions, answer: impl FnOnce(&CpuTree<'_>) -> Result<T>) -> Result<(T, Cost)> {
     let tree = CpuTree::new(mesh, options)?;
-    let bad_cells = [tree.topology.counts.bad, 0];
-    Ok(InBlocks { answer: answer(&tree)?, trees: 1, peak: 0, build_seconds: tree.build_ms / 1e3, bad_cells })
+    let cost = Cost { trees: 1, peak: 0, build_seconds: tree.build_ms / 1e3, bad_cells: [tree.topology.counts.bad, 0] };
+    Ok((answer(&tree)?, cost))
 }
 
 impl<'a> CpuTree<'a> {
@@ -229,7 +203,7 @@ mod tests {
             owners.extend(band.owners);
             Ok(())
         };
-        Cpu.slice(&SliceRequest { mesh, options, field: None, voxels, extrapolate }, None, &|_, _| Ok(()), &mut sink)?;
+        Cpu.slice(&SliceRequest { mesh, options, field: None, voxels, extrapolate }, &|_, _| Ok(()), &mut sink)?;
         let CpuTree { topology, tree, .. } = &CpuTree::new(mesh, &options)?;
         let whole = Slicer::new(mesh, topology, tree, None, *voxels, extrapolate)?.band(Rows { layer: 0, first: 0, count: 130 });
         assert!(owners == whole.owners, "{} owners differ", owners.iter().zip(&whole.owners).filter(|(a, b)| a != b).count());

@@ -2,7 +2,7 @@
 
 use super::{Engine, OnProgress, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
-use olbvh::blocks::{self, InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
+use olbvh::blocks::{self, Cost, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
@@ -12,30 +12,37 @@ use olbvh::query::{AllOwners, LocateOptions, Located, Nearest, Overlapped, Slice
 use olbvh::reference::boundary::Counts;
 use std::path::PathBuf;
 
-/// An opened device, and the target of its kernels with its origin.
-pub struct Device(Gpu, Shapes);
+/// An opened device.
+pub struct Device {
+    gpu: Gpu,
+    /// The target of its kernels, and where it comes from.
+    shapes: Shapes,
+    /// Maximum number of bytes of device memory for a query.
+    memory: u64,
+}
 
 impl Device {
     /// Opens the device that `--device` names, or the best one, with the target that applies. Compiled pipelines are
-    /// kept in the user's cache folder.
-    pub fn open(common: &Common) -> Outcome<Self> {
+    /// kept in the user's cache folder. Without a limit of `memory`, queries may use that of the device.
+    pub fn open(common: &Common, memory: Option<u64>) -> Outcome<Self> {
         // The device is trusted here, because the self-test follows with the target that it will have.
         let options = GpuOptions { device: common.device.clone(), pipeline_cache: cache_folder(), trust: true, ..GpuOptions::default() };
         let gpu = Gpu::new(&options)?;
         let shapes = Shapes::of(common, gpu.report())?;
         let gpu = gpu.with_target(shapes.target.clone())?;
         gpu.self_test()?;
-        Ok(Self(gpu, shapes))
+        let memory = memory.unwrap_or(gpu.report().memory);
+        Ok(Self { gpu, shapes, memory })
     }
 
-    /// Maximum number of bytes of device memory: the given number, or else the device's memory.
-    fn memory(&self, given: Option<u64>) -> u64 {
-        given.unwrap_or(self.0.report().memory)
+    /// A handle for one query, which counts its memory.
+    fn limited(&self) -> Gpu {
+        self.gpu.with_memory(self.memory)
     }
 
     /// The device, and the target of its kernels with its origin.
     pub fn into_parts(self) -> (Gpu, Shapes) {
-        (self.0, self.1)
+        (self.gpu, self.shapes)
     }
 }
 
@@ -48,16 +55,16 @@ fn cache_folder() -> Option<PathBuf> {
 
 impl Engine for Device {
     fn name(&self) -> String {
-        self.0.report().name.clone()
+        self.gpu.report().name.clone()
     }
 
     fn target(&self) -> Option<&Shapes> {
-        Some(&self.1)
+        Some(&self.shapes)
     }
 
     fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary> {
-        let device = DeviceMesh::upload(&self.0, mesh, BadCells::Skip)?;
-        let tree = Tree::build(&self.0, &device, options)?;
+        let device = DeviceMesh::upload(&self.gpu, mesh, BadCells::Skip)?;
+        let tree = Tree::build(&self.gpu, &device, options)?;
         let (cells, built) = (device.status(), tree.status());
         let bad = if cells.bad == 0 { Vec::new() } else { device.bad_cells()? };
         Ok(Summary {
@@ -87,39 +94,27 @@ impl Engine for Device {
         })
     }
 
-    fn locate(
-        &self,
-        asked: &LocateRequest<'_>,
-        how: &LocateOptions,
-        memory: Option<u64>,
-        report: OnProgress<'_>,
-    ) -> Result<InBlocks<Located>> {
-        blocks::locate(&self.0, self.memory(memory), asked, None, how, report)
+    fn locate(&self, asked: &LocateRequest<'_>, how: &LocateOptions, report: OnProgress<'_>) -> Result<(Located, Cost)> {
+        blocks::locate(&self.limited(), asked, how, report)
     }
 
-    fn locate_all(
-        &self,
-        asked: &LocateRequest<'_>,
-        tolerance: f32,
-        memory: Option<u64>,
-        report: OnProgress<'_>,
-    ) -> Result<InBlocks<AllOwners>> {
-        blocks::locate_all(&self.0, self.memory(memory), asked, tolerance, report)
+    fn locate_all(&self, asked: &LocateRequest<'_>, tolerance: f32, report: OnProgress<'_>) -> Result<(AllOwners, Cost)> {
+        blocks::locate_all(&self.limited(), asked, tolerance, report)
     }
 
-    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
-        blocks::nearest(&self.0, self.memory(memory), asked, within, report)
+    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, report: OnProgress<'_>) -> Result<(Nearest, Cost)> {
+        blocks::nearest(&self.limited(), asked, within, report)
     }
 
-    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlapped>> {
-        blocks::overlap(&self.0, self.memory(memory), asked, report)
+    fn overlap(&self, asked: &OverlapRequest<'_>, report: OnProgress<'_>) -> Result<(Overlapped, Cost)> {
+        blocks::overlap(&self.limited(), asked, report)
     }
 
-    fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
-        blocks::render(&self.0, self.memory(memory), asked, report)
+    fn render(&self, asked: &RenderRequest<'_>, report: OnProgress<'_>) -> Result<(Picture, Cost)> {
+        blocks::render(&self.limited(), asked, report)
     }
 
-    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Sliced>> {
-        blocks::slice(&self.0, self.memory(memory), asked, report, sink)
+    fn slice(&self, asked: &SliceRequest<'_>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<(Sliced, Cost)> {
+        blocks::slice(&self.limited(), asked, report, sink)
     }
 }
