@@ -172,6 +172,11 @@ impl Assembly {
                 "{n} cells of higher order are taken by their corners: their edges are straight, and fields are linear in them{remedy}"
             ));
         }
+        if self.tangled > 0 {
+            let remedy = "volumes and values there are wrong; split them into convex cells first";
+            self.warnings
+                .push(format!("{} split cells are so warped, or so far from convex, that pieces of them overlap: {remedy}", self.tangled));
+        }
         let missing = self.counts.iter().filter(|c| c.fate == Fate::Unsupported).map(|c| format!("{} {}", c.count, c.name));
         let missing = missing.collect::<Vec<_>>().join(", ");
         if !missing.is_empty() {
@@ -311,5 +316,6 @@ mod cells;
 mod pieces;
 mod polyhedra;
 mod scale;
+mod star;
 #[cfg(test)]
 mod tests;

@@ -197,6 +197,15 @@ pub(crate) fn vtk(number: i64) -> Option<CellType> {
     })
 }
 
+/// The cell type with this number in VTK of a cell with so many nodes. Gmsh writes quadratic pyramids under the number of
+/// those with straight edges.
+pub(crate) fn vtk_of(number: i64, nodes: usize) -> Option<CellType> {
+    match (number, nodes) {
+        (14, 13 | 14) => Some(cell("quadratic pyramid", Shape::Pyramid, nodes)),
+        _ => vtk(number),
+    }
+}
+
 /// If a cell array of this name marks ghost cells (copies of cells of a neighbouring piece) and hidden ones, the
 /// predicate for its values. Older versions of VTK store ghost levels.
 pub(crate) fn ghost(array: &str) -> Option<fn(i64) -> bool> {

@@ -102,8 +102,8 @@ fn nodes_at(places: &[Place], edges: &[[usize; 2]], middles: &[Place]) -> Option
     let longest = edges.iter().map(|&[i, j]| square(places[i], places[j])).fold(0.0, f64::max);
     let mut node_at = vec![None; middles.len()];
     for (node, middle) in (corners..).zip(assign(&places[corners..], middles)) {
-        // A node that is not a number is not near, either.
-        if !(square(places[node], middles[middle]) <= 0.3 * longest) || node_at[middle].replace(node).is_some() {
+        let distance = square(places[node], middles[middle]);
+        if distance.is_nan() || distance > 0.3 * longest || node_at[middle].replace(node).is_some() {
             return None;
         }
     }

@@ -17,8 +17,9 @@ use crate::error::{Error, Result};
 /// point per line and columns separated by commas, semicolons, tabs or spaces, in the same way throughout. Fields may
 /// be in quotation marks, and where commas do not separate columns they may be decimal marks. The first line of a table
 /// may name the columns, `x`, `y` and `z` among them (also as in `X [ m ]`, `x-coordinate` or `Points:0`): these are used.
-/// Without names there must be three columns. Lines that start with `#` are comments; the last one before the points may
-/// name the columns as well. A table without points is valid, even an empty file.
+/// Without names there must be three columns. Lines that start with `#` or `%` are comments; the last one before the points
+/// may name the columns as well. A table without points is valid, even an empty file. Text is UTF-8, or UTF-16 with a
+/// byte-order mark.
 ///
 /// Of a mesh, in any format of [`super::load`] or procedural, these are all points in the order of the file, also those
 /// that no cell uses; it may consist of surfaces only. Files named `.vtp`, `.obj`, `.ply` or `.stl`, and a `.vtk` with
@@ -36,10 +37,27 @@ pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
 }
 
 fn of(source: Source) -> Result<Vec<[f64; 3]>> {
+    // A mesh in UTF-16 is refused as elsewhere.
+    let source = if is_utf16(source.start()) && !detect::is_mesh(&source)? { decoded(&source.whole()?)? } else { source };
     if let Some(points) = surfaces::points(&source) {
         return points;
     }
     if detect::is_mesh(&source)? { of_mesh(&source) } else { points(&source.whole()?) }
+}
+
+/// Whether a text is in UTF-16, with a byte-order mark, as Windows writes it.
+fn is_utf16(bytes: &[u8]) -> bool {
+    [b"\xff\xfe", b"\xfe\xff"].iter().any(|mark| bytes.starts_with(*mark))
+}
+
+/// A text in UTF-16, as UTF-8.
+fn decoded(source: &Source) -> Result<Source> {
+    let (big_endian, bytes) = (source.start().first() == Some(&0xfe), source.start().get(2..).unwrap_or_default());
+    let unit = |pair: &[u8]| if big_endian { u16::from_be_bytes([pair[0], pair[1]]) } else { u16::from_le_bytes([pair[0], pair[1]]) };
+    let text = char::decode_utf16(bytes.chunks_exact(2).map(unit)).collect::<Result<String, _>>();
+    let text = text.ok().filter(|_| bytes.len() % 2 == 0);
+    let text = text.ok_or_else(|| source.error("it begins as text in UTF-16, but is none; save it as UTF-8"))?;
+    Ok(Source::new(&source.path, text.into_bytes()))
 }
 
 /// Reads points from a stream, such as standard input, in the formats of [`load_points`].
@@ -100,9 +118,14 @@ fn parts(source: &Source, range: Range<usize>) -> impl Iterator<Item = Range<usi
     })
 }
 
+/// Whether a line is a comment: `#` as in NumPy and many others, `%` as in COMSOL and MATLAB.
+fn is_comment(line: &[u8]) -> bool {
+    line.starts_with(b"#") || line.starts_with(b"%")
+}
+
 /// The next line of `rest` that holds something, and its position. Spreadsheets leave lines of separators behind.
 fn next_line<'s>(source: &'s Source, rest: &mut Range<usize>) -> Option<(&'s [u8], usize)> {
-    let holds = |line: &[u8]| !line.starts_with(b"#") && line.iter().any(|b| !b";,".contains(b) && !b.is_ascii_whitespace());
+    let holds = |line: &[u8]| !is_comment(line) && line.iter().any(|b| !b";,".contains(b) && !b.is_ascii_whitespace());
     while let Some(bytes) = source.start().get(rest.clone()).filter(|bytes| !bytes.is_empty()) {
         let length = memchr::memchr2(b'\n', b'\r', bytes).unwrap_or(bytes.len());
         let (line, at) = (bytes[..length].trim_ascii(), rest.start);
@@ -121,12 +144,19 @@ fn columns(source: &Source, rest: &mut Range<usize>) -> Result<Option<Columns>> 
     let separator = separator(line, None);
     let names: Vec<_> = fields(line, separator).collect();
     let (width, numbers) = (names.len(), names.iter().filter(|name| number(name).is_some()).count());
+    let ambiguous = |at: usize| {
+        move |axis: usize| {
+            let axis = ["x", "y", "z"][axis];
+            source.error_line(at, format!("several columns are named {axis}; rename all but the one to be read, or remove them"))
+        }
+    };
     if numbers == width
-        && let Some(at) = commented(&source.start()[..at], width)
+        && let Some((names, line)) = commented(&source.start()[..at], width)
+        && let Some(at) = named(&names).map_err(ambiguous(line))?
     {
         return Ok(Some(Columns { separator, width, at }));
     }
-    let named = if numbers == width { None } else { named(&names) };
+    let named = if numbers == width { None } else { named(&names).map_err(ambiguous(at))? };
     // Other names may stand for anything in any order.
     if numbers == 0 && named.is_none() && width == 3 {
         let found = excerpt(line);
@@ -146,12 +176,23 @@ fn columns(source: &Source, rest: &mut Range<usize>) -> Result<Option<Columns>> 
     Ok(next_line(source, &mut first).map(|(line, _)| Columns { separator: self::separator(line, Some(separator)), width, at }))
 }
 
-/// The columns that the last comment before the points names, where it names them all, as NumPy writes a header.
-fn commented(before: &[u8], width: usize) -> Option<[usize; 3]> {
+/// The names in the last comment before the points, if there are as many as columns, as NumPy writes a header, and its
+/// position. COMSOL writes names with spaces in them, and several spaces between names.
+fn commented(before: &[u8], width: usize) -> Option<(Vec<&[u8]>, usize)> {
     let mut lines = before.split(|b| b"\r\n".contains(b)).map(<[u8]>::trim_ascii);
-    let line = lines.rfind(|line| line.starts_with(b"#"))?;
+    let line = lines.rfind(|line| is_comment(line))?;
+    let at = memchr::memmem::rfind(before, line)?;
     let names: Vec<_> = fields(&line[1..], separator(&line[1..], None)).collect();
-    if names.len() == width { named(&names) } else { None }
+    if names.len() == width {
+        return Some((names, at));
+    }
+    let (mut names, mut rest) = (Vec::new(), line[1..].trim_ascii());
+    while !rest.is_empty() {
+        let length = memchr::memmem::find(rest, b"  ").unwrap_or(rest.len());
+        names.push(&rest[..length]);
+        rest = rest[length..].trim_ascii_start();
+    }
+    (names.len() == width).then_some((names, at))
 }
 
 impl Columns {
@@ -224,14 +265,18 @@ fn number(field: &[u8]) -> Option<f64> {
     })
 }
 
-/// The columns that hold x, y and z, found by their names: the axes themselves before names that contain them.
-fn named(fields: &[&[u8]]) -> Option<[usize; 3]> {
-    let find = |axis_of: &dyn Fn(&[u8]) -> Option<usize>| {
-        let at = [0, 1, 2].map(|axis| fields.iter().position(|field| axis_of(field) == Some(axis)));
-        Some([at[0]?, at[1]?, at[2]?])
-    };
+/// The columns that hold x, y and z, found by their names: the axes themselves before names that contain them. An error is
+/// the number of an axis that several columns are named after.
+fn named(fields: &[&[u8]]) -> Result<Option<[usize; 3]>, usize> {
     let plain = |field: &[u8]| "xyz".bytes().position(|axis| field.eq_ignore_ascii_case(&[axis]));
-    find(&plain).or_else(|| find(&axis_in))
+    for axis_of in [&plain as &dyn Fn(&[u8]) -> Option<usize>, &axis_in] {
+        let columns = [0, 1, 2].map(|axis| (0..fields.len()).filter(|&i| axis_of(fields[i]) == Some(axis)).collect::<Vec<_>>());
+        if columns.iter().all(|columns| !columns.is_empty()) {
+            let several = columns.iter().position(|columns| columns.len() > 1);
+            return several.map_or_else(|| Ok(Some(columns.each_ref().map(|columns| columns[0]))), Err);
+        }
+    }
+    Ok(None)
 }
 
 /// The axis in the name of a column, as other programs write it: `X [ m ]`, `z (mm)`, `x-coordinate`, `Points:0`.

@@ -61,7 +61,7 @@ pub struct Report {
     pub negative: u64,
     /// Tetrahedra whose volume is exactly zero in double precision.
     pub flat: u64,
-    /// Split cells that are so warped that some of their pieces are inverted.
+    /// Split cells that are so warped, or so far from convex, that some of their pieces overlap.
     pub tangled: u64,
     /// Smallest and largest coordinates of the points in use, in the coordinates of the file.
     pub bounds: [[f64; 3]; 2],
@@ -111,9 +111,6 @@ impl fmt::Display for Report {
         }
         if self.flat > 0 {
             writeln!(f, "  {} tetrahedra have no volume", self.flat)?;
-        }
-        if self.tangled > 0 {
-            writeln!(f, "  {} split cells are so warped that pieces of them overlap", self.tangled)?;
         }
         if self.origin != [0.0; 3] {
             let [x, y, z] = self.origin;

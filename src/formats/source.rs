@@ -83,9 +83,15 @@ impl Source {
         Self { path: path.into(), start: Arc::new(bytes), rest: None }
     }
 
-    /// The path of a file that this one names, which is relative to its folder.
+    /// The path of a file that this one names, which is relative to its folder. Where there is none of this name, its
+    /// backslashes are taken for slashes, as Windows writes paths.
     pub fn beside(&self, name: &str) -> PathBuf {
-        self.path.parent().unwrap_or(Path::new("")).join(name)
+        let within = |name: &str| self.path.parent().unwrap_or(Path::new("")).join(name);
+        let path = within(name);
+        if !name.contains('\\') || path.is_file() {
+            return path;
+        }
+        Some(within(&name.replace('\\', "/"))).filter(|slashed| slashed.is_file()).unwrap_or(path)
     }
 
     /// Length of the contents in bytes.

@@ -12,7 +12,7 @@ use crate::error::Result;
 pub(crate) fn points(source: &Source) -> Option<Result<Vec<[f64; 3]>>> {
     let begins = |with: &[u8]| source.start().starts_with(with);
     match ending(&source.path).as_str() {
-        "obj" => Some(lines(source, b"v")),
+        "obj" => Some(obj(source)),
         "ply" => Some(ply(source)),
         "stl" => Some(stl(source)),
         _ if begins(b"# vtk DataFile") => vtk::surface_points(source),
@@ -22,19 +22,28 @@ pub(crate) fn points(source: &Source) -> Option<Result<Vec<[f64; 3]>>> {
     }
 }
 
-/// The points of the lines that begin with a keyword. What follows the coordinates, such as a colour, is skipped.
-fn lines(source: &Source, keyword: &[u8]) -> Result<Vec<[f64; 3]>> {
+/// The words of a line.
+fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+/// The point of a line at this position whose other words are `words`. What follows the coordinates, such as a colour, is skipped.
+fn vertex<'l>(source: &Source, line: &[u8], at: usize, mut words: impl Iterator<Item = &'l [u8]>) -> Result<[f64; 3]> {
+    let point = [(); 3].map(|()| words.next().and_then(parse_float));
+    let [Some(x), Some(y), Some(z)] = point else {
+        return Err(source.error_line(at, format!("`{}` where a vertex should have three coordinates", excerpt(line))));
+    };
+    Ok([x, y, z])
+}
+
+/// The points of the lines that begin with `v`.
+fn obj(source: &Source) -> Result<Vec<[f64; 3]>> {
     let (mut tokens, mut points) = (Tokens::new(source, None), Vec::new());
     while let Some((line, at)) = tokens.line()? {
-        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-        if words.next() != Some(keyword) {
-            continue;
+        let mut words = words(line);
+        if words.next() == Some(b"v") {
+            points.push(vertex(source, line, at, words)?);
         }
-        let point = [(); 3].map(|()| words.next().and_then(parse_float));
-        let [Some(x), Some(y), Some(z)] = point else {
-            return Err(source.error_line(at, format!("`{}` where a vertex should have three coordinates", excerpt(line))));
-        };
-        points.push([x, y, z]);
     }
     Ok(points)
 }
@@ -54,14 +63,7 @@ fn is_binary_stl(source: &Source) -> bool {
 fn stl(source: &Source) -> Result<Vec<[f64; 3]>> {
     let mut tokens = Tokens::new(source, None);
     if !is_binary_stl(source) {
-        // Text, unless a binary file is cut off.
-        let points = lines(source, b"vertex")?;
-        let is_text = !points.is_empty() || source.start().trim_ascii_start().starts_with(b"solid");
-        return if is_text {
-            Ok(points)
-        } else {
-            Err(source.error("neither text (`solid …`) nor binary of the length that it announces"))
-        };
+        return stl_text(source);
     }
     let mut points = Vec::new();
     tokens.bytes(STL[0])?;
@@ -70,6 +72,44 @@ fn stl(source: &Source) -> Result<Vec<[f64; 3]>> {
         points.extend(values.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
     }
     Ok(points)
+}
+
+fn stl_text(source: &Source) -> Result<Vec<[f64; 3]>> {
+    let (mut tokens, mut points) = (Tokens::new(source, None), Vec::new());
+    // A solid and a facet that have begun, and the first point of the facet.
+    let (mut solid, mut facet, mut first) = (false, None, 0);
+    let is = |word: Option<&[u8]>, wanted: &str| word.is_some_and(|word| word.eq_ignore_ascii_case(wanted.as_bytes()));
+    while let Some((line, at)) = tokens.line()? {
+        let mut words = words(line);
+        let word = words.next();
+        if is(word, "vertex") {
+            points.push(vertex(source, line, at, words)?);
+        } else if is(word, "facet") {
+            (facet, first) = (Some(at), points.len());
+        } else if is(word, "endfacet") {
+            let n = points.len() - first;
+            if facet.take().is_some() && n != 3 {
+                return Err(source.error_line(at, format!("a facet of {n} vertices ends; it must have three")));
+            }
+        } else if is(word, "solid") {
+            solid = true;
+        } else if is(word, "endsolid") || is(word, "end") && is(words.next(), "solid") {
+            solid = false;
+        }
+    }
+    // A binary file that is cut off may begin like a text, but it has bytes 0.
+    let is_text = source.start().trim_ascii_start().starts_with(b"solid") && !source.start().contains(&0);
+    if points.is_empty() && !is_text {
+        return Err(source.error("neither text (`solid …`) nor binary of the length that it announces"));
+    }
+    let remedy = "it has been cut off; write or copy it again";
+    match facet {
+        Some(at) => {
+            Err(source.error_line(source.len(), format!("the file ends in the facet that begins in line {}: {remedy}", source.line(at))))
+        }
+        None if solid => Err(source.error_line(source.len(), format!("the file ends without `endsolid`: {remedy}"))),
+        None => Ok(points),
+    }
 }
 
 /// The vertices must be the first element, as they always are.
@@ -127,6 +167,9 @@ mod tests {
 
     const WANTED: [[f64; 3]; 3] = [[0.0, 0.5, 1.0], [1.0, 0.0, 2.0], [-1.0, 3.0, 0.25]];
 
+    const STL_TEXT: &str = "solid s\n facet normal 0 0 1\n  outer loop\n   vertex 0 0.5 1\n   vertex 1 0 2\n   vertex -1 3 2.5e-1\n  endloop\n \
+                            endfacet\nendsolid s\n";
+
     #[test]
     fn vertices_are_those_of_the_file_in_its_order() {
         let obj = b"# a\nmtllib x\nv 0 0.5 1\nvn 0 0 1\nv 1 0 2 1 0.5 0.5 0.5\r\nvt 0 0\nv\t-1 3 .25\nf 1/1/1 2 3\n";
@@ -151,8 +194,8 @@ mod tests {
         let points = "POINTS 3 float\n0 0.5 1 1 0 2\n-1 3 0.25\nVERTICES 1 2\n1 0\n";
         let vtk = format!("# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\n{field}{points}");
         assert_eq!(read("a.vtk", vtk.as_bytes()).unwrap(), WANTED);
-        let text = "solid s\nfacet normal 0 0 1\nouter loop\n vertex 0 0.5 1\n vertex 1 0 2\n vertex -1 3 2.5e-1\nendloop\nendfacet\n";
-        assert_eq!(read("a.stl", text.as_bytes()).unwrap(), WANTED);
+        assert_eq!(read("a.stl", STL_TEXT.as_bytes()).unwrap(), WANTED);
+        assert_eq!(read("a.stl", STL_TEXT.to_ascii_uppercase().replace("ENDSOLID", "end solid").as_bytes()).unwrap(), WANTED);
         // The header of a binary file may begin like a text.
         let mut binary = [&b"solid s"[..], &[0; 73], &1u32.to_le_bytes(), &[0; 12]].concat();
         binary.extend(WANTED.as_flattened().iter().flat_map(|v| (*v as f32).to_le_bytes()));
@@ -175,5 +218,22 @@ mod tests {
         ] {
             assert_eq!(read(name, content.as_bytes()).unwrap_err(), wanted);
         }
+        // Cut off anywhere but in the last line.
+        let end = STL_TEXT.find("endsolid").unwrap();
+        for cut in 6..=end {
+            let error = read("a.stl", &STL_TEXT.as_bytes()[..cut]).unwrap_err();
+            let line = 1 + STL_TEXT[..cut].matches('\n').count();
+            assert!(error.starts_with(&format!("a.stl: line {line}: ")), "{error}");
+        }
+        let whole = |cut: usize| read("a.stl", &STL_TEXT.as_bytes()[..cut]).unwrap_err();
+        let remedy = "it has been cut off; write or copy it again";
+        assert_eq!(whole(end), format!("a.stl: line 9: the file ends without `endsolid`: {remedy}"));
+        let facet = STL_TEXT.find("endloop").unwrap();
+        assert_eq!(whole(facet), format!("a.stl: line 7: the file ends in the facet that begins in line 2: {remedy}"));
+        let two = STL_TEXT.replace("   vertex 1 0 2\n", "");
+        assert_eq!(read("a.stl", two.as_bytes()).unwrap_err(), "a.stl: line 7: a facet of 2 vertices ends; it must have three");
+        // Binary, and cut off.
+        let binary = [&b"solid s"[..], &[0; 73], &9u32.to_le_bytes(), &[0; 50]].concat();
+        assert!(read("a.stl", &binary).unwrap_err().contains("nor binary of the length that it announces"));
     }
 }

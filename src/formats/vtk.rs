@@ -122,9 +122,9 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut end = 0;
     for cell in 0..cells.count {
         let number = types.at(cell)?;
-        let kind = cells::vtk(number);
-        let kind = kind.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?;
         let nodes = cells.nodes(cell, &mut end)?;
+        let kind = cells::vtk_of(number, nodes.len());
+        let kind = kind.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?;
         if ghosts.get(cell) == Some(&true) {
             assembly.skip("ghost or hidden cell", Fate::Ghost);
             continue;

@@ -229,6 +229,33 @@ fn rotations_are_about_the_centre_of_the_cells() {
     assert_eq!(posed(&["--rotate-b", "z,90", "--move-b", "0,0,1.5"]), [0, 0]);
 }
 
+/// Where the mesh is, but no value of the field.
+#[test]
+fn slices_without_values_are_remarked_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let points = "POINTS 8 float 0 0 0 1 0 0 0 1 0 0 0 1 0 0 5 1 0 5 0 1 5 0 0 6";
+    let head = "# vtk DataFile Version 3.0\ntwo\nASCII\nDATASET UNSTRUCTURED_GRID";
+    let file = |values: &str| {
+        let data = format!("CELL_DATA 2 SCALARS t float 1\nLOOKUP_TABLE default\n{values}");
+        format!("{head}\n{points}\nCELLS 2 10 4 0 1 2 3 4 4 5 6 7 CELL_TYPES 2 10 10\n{data}\n")
+    };
+    let some = "no voxel has a value: t has none where the voxels are";
+    for (values, at, wanted) in [
+        ("nan nan", "0.3", "no voxel has a value: t has none anywhere"),
+        ("1 nan", "5.3", some),
+        ("1 nan", "0.3", ""),
+        ("1 nan", "3", "all"),
+    ] {
+        std::fs::write(folder.path().join("two.vtk"), file(values)).unwrap();
+        for output in ["a.png", "a.npy"] {
+            let (code, _, text) = olbvh(folder.path(), &["slice", "two.vtk", "-o", output, "--field", "t", "--size", "9", "--at", at]);
+            let remarks: Vec<&str> = text.lines().filter(|line| line.contains("voxel")).collect();
+            assert_eq!((code, remarks.len()), (0, usize::from(!wanted.is_empty())), "{text}");
+            assert!(remarks.iter().all(|remark| remark.starts_with(wanted)), "{text}");
+        }
+    }
+}
+
 /// Bad cells are left out, but never silently.
 #[test]
 fn bad_cells_are_told() {

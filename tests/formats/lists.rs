@@ -91,6 +91,30 @@ fn listed_grids_are_pieces_of_one_mesh() {
     }
 }
 
+/// Such lists name files with backslashes. A file that has one in its name is still found.
+#[test]
+fn lists_written_on_windows_are_read() {
+    let folder = folder();
+    let sets = ["a &amp; b", "c"].map(|name| format!("<DataSet timestep='0' file='.\\{name}\\grid.vtu'/>")).concat();
+    let found = read(&folder, "both.pvd", &file("Collection", &sets)).unwrap().mesh;
+    assert_eq!(fields(&found), [("s", On::Cells, &[7.0, 8.0][..])]);
+    let pieces = "<Piece Source='a &amp; b\\grid.vtu'/><Piece Source='c\\grid.vtu'/>";
+    assert_eq!(read(&folder, "both.pvtu", &file("PUnstructuredGrid", pieces)).unwrap().mesh.tets.len(), 2);
+    let series = "{\"files\": [{\"name\": \".\\\\c\\\\grid.vtu\", \"time\": 0}]}";
+    assert_eq!(read(&folder, "c.vtu.series", series).unwrap().mesh.field("s").unwrap().values, [8.0]);
+    // A result must not replace a file that is listed like this.
+    assert_eq!(listed_files(&folder.path().join("both.pvtu")), ["a & b/grid.vtu", "c/grid.vtu"].map(|name| folder.path().join(name)));
+    fs::copy(folder.path().join("both.vtu"), folder.path().join("c\\grid.vtu")).unwrap();
+    let twin = file("PUnstructuredGrid", "<Piece Source='c\\grid.vtu'/>");
+    assert_eq!(read(&folder, "twin.pvtu", &twin).unwrap().mesh.tets.len(), 2);
+    // The same file, written in two ways.
+    let twice = file("PUnstructuredGrid", "<Piece Source='a &amp; b/grid.vtu'/>\n<Piece Source='a &amp; b\\grid.vtu'/>");
+    let error = read(&folder, "twice.pvtu", &twice).unwrap_err();
+    assert!(error.ends_with("the file is listed twice"), "{error}");
+    let gone = read(&folder, "gone.pvtu", &file("PUnstructuredGrid", "<Piece Source='d\\grid.vtu'/>")).unwrap_err();
+    assert_eq!(gone, "gone.pvtu: line 3: `d\\grid.vtu`: there is no such file");
+}
+
 #[test]
 fn files_without_volumes_are_left_out() {
     let folder = folder();

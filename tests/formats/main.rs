@@ -1,7 +1,12 @@
 //! Readers of meshes, and writers of results.
 #![cfg(feature = "formats")]
 #![allow(clippy::unwrap_used, reason = "also in helpers of tests")]
-#![allow(clippy::format_collect, clippy::format_push_string, reason = "simple code matters more than speed here")]
+#![allow(
+    clippy::format_collect,
+    clippy::format_push_string,
+    clippy::case_sensitive_file_extension_comparisons,
+    reason = "simple code matters more than speed here"
+)]
 
 mod abaqus;
 mod disk;

@@ -124,6 +124,67 @@ fn prisms_fit_polyhedra() {
     }
 }
 
+/// A file with one polyhedron of these faces; those whose bit is set in `turned` are wound the other way.
+fn polyhedron(points: &[[f64; 3]], faces: &[Vec<usize>], turned: u32) -> Loaded {
+    let face = |(i, face): (usize, &Vec<usize>)| {
+        let mut face = face.clone();
+        if turned >> i & 1 == 1 {
+            face.reverse();
+        }
+        format!(" {} {}", face.len(), face.iter().map(usize::to_string).collect::<Vec<_>>().join(" "))
+    };
+    let faces = format!("{}{}", faces.len(), faces.iter().enumerate().map(face).collect::<String>());
+    let length = faces.split(' ').count();
+    let points: Vec<String> = points.iter().map(|[x, y, z]| format!("{x} {y} {z}")).collect();
+    let text = format!(
+        "# vtk DataFile Version 3.0\n\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n{}\nCELLS 1 {}\n{length} {faces}\nCELL_TYPES 1\n42\n",
+        points.len(),
+        points.join("\n"),
+        length + 1,
+    );
+    open_bytes("one.vtk", text.into_bytes())
+}
+
+/// The corners of a prism of height 1 over a polygon, and its faces, wound consistently.
+fn prism(polygon: &[[f64; 2]]) -> (Vec<[f64; 3]>, Vec<Vec<usize>>) {
+    let n = polygon.len();
+    let points = [0.0, 1.0].iter().flat_map(|&z| polygon.iter().map(move |&[x, y]| [x, y, z])).collect();
+    let sides = (0..n).map(|i| vec![i, (i + 1) % n, n + (i + 1) % n, n + i]);
+    (points, sides.chain([(0..n).rev().collect(), (n..2 * n).collect()]).collect())
+}
+
+/// However the faces are wound, also if all of them turn away from the middle of the corners.
+#[test]
+fn polyhedra_whose_pieces_overlap_are_tangled() {
+    let l_shape = [[0., 0.], [4., 0.], [4., 1.], [1., 1.], [1., 4.], [0., 4.]];
+    let convex = [[0., 0.], [4., 0.], [4., 1.], [2., 3.], [1., 4.], [0., 4.]];
+    // A node on a straight side is not quite on it in single precision, which makes little difference.
+    let hanging = [[0., 0.], [4., 0.], [4., 1.], [2.5, 2.499_999_9], [1., 4.], [0., 4.]];
+    for (polygon, area, tangled) in [(l_shape, 7.0, 1), (convex, 11.5, 0), (hanging, 11.5, 0)] {
+        let (points, faces) = prism(&polygon);
+        for turned in (0..256).step_by(5) {
+            let Loaded { mesh, report } = polyhedron(&points, &faces, turned);
+            assert_eq!((report.tangled, report.warnings.len()), (tangled, tangled as usize), "{turned}: {report}");
+            assert!(tangled == 0 || report.warnings[0].starts_with("1 split cells are so warped, or so far from convex"), "{report}");
+            assert_eq!((volumes(&mesh)[0] - area).abs() < 1e-5, tangled == 0);
+        }
+    }
+    // A surface that is not closed has no inside that pieces could leave.
+    let (points, faces) = prism(&l_shape);
+    assert_eq!(polyhedron(&points, &faces[1..], 0).report.tangled, 0);
+    // A cavity around the middle, each of whose surfaces is seen from there.
+    let cube = |half: f64| CUBE.map(|corner| corner.map(|x| half * x)).to_vec();
+    let shifted: Vec<Vec<usize>> = SIDES.iter().map(|face| face.iter().map(|v| v + 8).collect()).collect();
+    let sides = SIDES.map(|face| face.to_vec()).to_vec();
+    assert_eq!(polyhedron(&cube(1.0), &sides, 0).report.tangled, 0);
+    assert_eq!(polyhedron(&[cube(1.0), cube(0.5)].concat(), &[sides, shifted].concat(), 0).report.tangled, 1);
+}
+
+const CUBE: [[f64; 3]; 8] =
+    [[-1., -1., -1.], [1., -1., -1.], [1., 1., -1.], [-1., 1., -1.], [-1., -1., 1.], [1., -1., 1.], [1., 1., 1.], [-1., 1., 1.]];
+/// Its faces.
+const SIDES: [[usize; 4]; 6] = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+
 #[test]
 fn broken_lists_of_faces_are_refused() {
     let files = polyhedra();

@@ -362,6 +362,32 @@ fn nodes_of_a_wedge_are_not_in_its_triangles() {
     assert!((total - 0.50179).abs() < 0.004, "{total}");
 }
 
+/// Gmsh writes quadratic pyramids with the number of linear ones, and its own order of nodes.
+#[test]
+fn quadratic_pyramids_of_gmsh_are_read() {
+    let corners = [[0., 0., 0.], [2., 0., 0.], [2., 2., 0.], [0., 2., 0.], [1., 1., 2.]];
+    let edges: [[usize; 2]; 8] = [[0, 1], [0, 3], [0, 4], [1, 2], [1, 4], [2, 3], [2, 4], [3, 4]];
+    let mut points = corners.to_vec();
+    points.extend(edges.map(|[i, j]| [0, 1, 2].map(|c| 0.5 * (corners[i][c] + corners[j][c]))));
+    points.push([1., 1., -0.25]);
+    for nodes in [13, 14] {
+        let text = file(&points, &[(0..nodes).collect()], &[14]);
+        for (curved, fate) in [(Curved::Corners, Fate::Straightened), (Curved::Split, Fate::Split)] {
+            let Loaded { mesh, report } =
+                load_bytes("pyramid.vtk", text.clone().into_bytes(), &LoadOptions { curved, ..LoadOptions::default() }).unwrap();
+            assert_eq!((report.cells[0].name.as_str(), report.cells[0].count), ("quadratic pyramid", 1));
+            assert_eq!(report.warnings.len(), usize::from(fate == Fate::Straightened), "{report}");
+            // The node of the base is the top of a pyramid below it.
+            let bend = if curved == Curved::Split && nodes == 14 { 4.0 * 0.25 / 3.0 } else { 0.0 };
+            let volume: f64 = mesh.tets.iter().map(|&t| volume(&mesh, t)).sum();
+            assert!((volume - (8.0 / 3.0 + bend)).abs() < 1e-6, "{nodes}: {volume}");
+        }
+    }
+    let odd = file(&points, &[(0..12).collect()], &[14]);
+    let error = load_bytes("pyramid.vtk", odd.into_bytes(), &LoadOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("cell 0 (pyramid): 12 points, but this type has 5"), "{error}");
+}
+
 /// The volume of a box of 2.5 × 1 × 1 whose own tetrahedra are folded at 16 faces, so that a little of it is counted
 /// twice.
 const MIXED: f64 = 2.501_392_23;

@@ -164,9 +164,22 @@ fn tables_of_points() {
         "#v,x,y,z\n0,1,2.5,-3\n# x y z v\n0,4,5,6e3\n",
         "# Z [mm], Y, X\n# z y x of two places\n1 2.5 -3\n4 5 6e3\n",
         "zone,x_pos,y,y_pos,z,x,z_pos\n9,9,2.5,9,-3,1,9\n9,9,5,9,6e3,4,9\n",
+        "% x y z\n1 2.5 -3\n4 5 6e3\n",
+        "% z y x\n-3 2.5 1\n% the next\n6e3 5 4\n",
+        "% Model:    a.mph\n% T (K)      X           Y           Z\n293 1 2.5 -3\n293 4 5 6e3\n",
     ] {
-        std::fs::write(&path, text).unwrap();
-        assert_eq!(load_points(&path).unwrap_or_else(|e| panic!("{text}: {e}")), wanted, "{text}");
+        let read = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            load_points(&path).unwrap_or_else(|e| panic!("{text}: {e}"))
+        };
+        assert_eq!(read(text.as_bytes()), wanted, "{text}");
+        let units: Vec<u16> = format!("\u{feff}{}", text.trim_start_matches('\u{feff}')).encode_utf16().collect();
+        assert_eq!(read(&units.iter().flat_map(|unit| unit.to_le_bytes()).collect::<Vec<u8>>()), wanted, "{text}");
+        assert_eq!(read(&units.iter().flat_map(|unit| unit.to_be_bytes()).collect::<Vec<u8>>()), wanted, "{text}");
+    }
+    for odd in [&b"\xff\xfe1\0,"[..], b"\xfe\xff\xd8\0\0,"] {
+        std::fs::write(&path, odd).unwrap();
+        assert!(load_points(&path).unwrap_err().to_string().ends_with("p.csv: it begins as text in UTF-16, but is none; save it as UTF-8"));
     }
     for nothing in ["", "x,y,z\n", "# comment\n\n"] {
         std::fs::write(&path, nothing).unwrap();
@@ -185,6 +198,9 @@ fn tables_of_points() {
         ("\"1\",\"2\",\"three\"\n", "line 1: `three` is not a number"),
         ("1,2\0,3", "byte 3"),
         ("t,x,y\n1,2,3\n", "line 1: `t,x,y` are no names of coordinates; name the columns x, y and z"),
+        ("x,x,y,z\n1,2,3,4\n", "line 1: several columns are named x; rename all but the one to be read, or remove them"),
+        ("v,Points:0,y,Points:1,z,Points:2\n1,2,3,4,5,6\n", "line 1: several columns are named y; "),
+        ("# a b c d\n% x y Z z\n1,2,3,4\n", "line 2: several columns are named z; "),
         ("id,temperature,pressure\n1,2,3\n", "line 1: `id,temperature,pressure` are no names"),
     ] {
         std::fs::write(&path, text).unwrap();

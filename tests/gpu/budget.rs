@@ -242,7 +242,7 @@ fn every_capacity() {
             for (Built { tree: t, owners }, &room) in built.iter().zip(rooms) {
                 let status: BuildStatus = one(&content, t.status);
                 // By its entries, only as many levels are tried as it takes if each has a quarter of the entries.
-                let tried = (0..).find(|k| room << (2 * k) >= candidates(deepest)).map_or(0, |k| deepest.saturating_sub(k));
+                let tried = (0..=16).find(|k| room << (2 * k) >= candidates(deepest)).map_or(0, |k| deepest.saturating_sub(k));
                 let lowest = if by_entries { tried } else { 0 };
                 let fitting = (lowest..=deepest).rev().find(|&l| entries(l) <= room);
                 let level = fitting.or_else(|| (0..lowest).rev().find(|&l| candidates(l) <= room)).unwrap();

@@ -128,7 +128,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mut layers = Layers::create(&args.output, format, &placement, mesh, args.owners, look)?;
     let progress = Progress::new(common, "slicing");
     let start = Instant::now();
-    let mut sink = |band: Band| layers.band(band);
+    let mut has_values = false;
+    let mut sink = |band: Band| {
+        has_values = has_values || band.values.iter().any(|value| !value.is_nan());
+        layers.band(band)
+    };
     let asked = SliceRequest { mesh, options, field, voxels: &voxels, extrapolate: args.extrapolate };
     let (Sliced { tally, .. }, took) = engine.slice(&asked, &|done, total| progress.follow(done, total), &mut sink)?;
     layers.finish()?;
@@ -136,6 +140,10 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
     if tally.inside + tally.touched == 0 {
         common.remark(placement.remark_on_emptiness(args.axis_name(), &bounds, mesh));
+    } else if let Some(field) = field.filter(|_| !has_values) {
+        let name = printable(&field.name);
+        let where_ = if mesh.range(field, |_| true).is_none() { "anywhere" } else { "where the voxels are; --at moves them" };
+        common.remark(format_args!("no voxel has a value: {name} has none {where_}"));
     }
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     let done = Done { format, voxels, placement, field, tally, took, seconds, device: engine.name() };

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use super::super::cells::{CellType, Shape, cut};
+use super::super::cells::{CellType, Shape};
 use super::super::curved::Surface;
 use super::super::report::Fate;
 use super::Assembly;
 use super::cells::volume;
+use super::star::Star;
 use crate::error::{Error, Result};
 use crate::mesh::On;
 
@@ -20,41 +21,14 @@ pub(super) struct Centres {
     ends: Vec<usize>,
 }
 
-/// The triangles of the surface of a cell.
-#[derive(Default)]
-struct Star {
-    /// The number of each corner's place, see [`Assembly::place`], and of the point; sorted, each place once.
-    corners: Vec<(u32, u32)>,
-    /// Triangles between places.
-    triangles: Vec<[u32; 3]>,
-}
-
-impl Star {
-    /// Adds a face with these points.
-    fn add(&mut self, points: impl Iterator<Item = u32> + Clone, place: impl Fn(u32) -> u32) {
-        let places: Vec<u32> = points.clone().map(place).collect();
-        cut(&places, |triangle| self.triangles.push(triangle));
-        self.corners.extend(places.into_iter().zip(points));
-    }
-
-    /// To be called once all faces are added.
-    fn sort(&mut self) {
-        self.corners.sort_unstable();
-        self.corners.dedup_by_key(|corner| corner.0);
-    }
-
-    fn point(&self, place: u32) -> u32 {
-        self.corners[self.corners.partition_point(|corner| corner.0 < place)].1
-    }
-}
-
 impl Assembly {
     /// Adds the next cell of the file, a polyhedron. `faces` holds the number of its faces, and for each face the number
     /// of its points and these, indices of points of a piece that has the points `piece`.
     ///
     /// Faces are cut into triangles by [`cut`], and each triangle forms a tetrahedron with the mean of the corners, which
     /// lies in every convex cell. So the pieces fit those of neighbours, and the winding of faces, which files disagree
-    /// about, does not matter. A polyhedron of four corners and triangles is a tetrahedron itself.
+    /// about, does not matter. A polyhedron of four corners and triangles is a tetrahedron itself. Where the mean does not
+    /// see all of the surface, pieces overlap, and the cell counts as tangled.
     pub fn push_polyhedron(&mut self, kind: CellType, faces: &[i64], piece: Range<usize>) -> Result<()> {
         let id = self.next_id()?;
         let fail = |message: String| self.cell_error(id, kind, message);
@@ -112,19 +86,22 @@ impl Assembly {
             [a, b, middle, c]
         }));
         self.n_corners += u64::from(middle as usize >= self.points.len());
-        self.turn(before);
+        let volumes = self.turn(before);
+        self.tangled += u64::from(star.is_tangled(&volumes));
     }
 
-    /// Gives tetrahedra positive volumes, from number `start` on, and counts flat ones.
-    fn turn(&mut self, start: usize) {
-        for tet in &mut self.tets[start..] {
+    /// Gives tetrahedra positive volumes, from number `start` on, and counts flat ones. Returns the volumes that they had.
+    fn turn(&mut self, start: usize) -> Vec<f64> {
+        let turn = |tet: &mut [u32; 4]| {
             let at = |v: u32| self.points.get(v as usize).unwrap_or_else(|| &self.centres.points[v as usize - self.points.len()]);
             let volume = volume(tet.map(|v| *at(v)));
             self.flat += u64::from(volume == 0.0);
             if volume < 0.0 {
                 tet.swap(0, 1);
             }
-        }
+            volume
+        };
+        self.tets[start..].iter_mut().map(turn).collect()
     }
 
     /// The number of a new point: the sum of some others with these weights.

@@ -22,8 +22,11 @@ const SMALL: f64 = 1.0 / 8192.0;
 const SMALL_IN_LEAF: f32 = 1.0 / 8.0;
 /// Up to this many small cells make no long lists.
 const LEAST_SMALL: usize = 4096;
-/// Cells with less of the volume of their box than this are nearly flat; small distances change them much.
-const NEARLY_FLAT: f64 = 1e-3;
+/// What rounding may change by [`CHANGE`] has less than this part of its largest extent squared, times the distance from the
+/// origin, as six times its volume: corners move by 2^-23 of that distance on each axis.
+const MAY_CHANGE: f64 = 1.0 / 16384.0;
+/// The same for what rounding changes by about half as much in general, as its errors are seldom the largest.
+const THICK: f64 = MAY_CHANGE / 32.0;
 
 impl Assembly {
     /// Warnings if most cells are much smaller than the smallest leaf of a tree, whose lists are then long, and if rounding
@@ -36,22 +39,28 @@ impl Assembly {
         let farthest = (hi - origin).abs().max((lo - origin).abs()).max(hi - lo).max_element();
         let of = |tet: &[u32; 4]| {
             let corners = tet.map(|v| DVec3::from_array(self.points[v as usize]));
-            let (lo, hi) = (corners.into_iter().fold(corners[0], DVec3::min), corners.into_iter().fold(corners[0], DVec3::max));
-            let size = hi - lo;
-            // Rounding moves corners by 2^-24 of the distance at most.
-            let changed = size.min_element() < farthest / 4096.0 && {
-                let there = volume(corners.map(|p| p - origin));
+            let size = extent(&corners);
+            let there = volume(corners);
+            let may_change = there != 0.0 && there.abs() < MAY_CHANGE * farthest * size.length_squared();
+            let changed = may_change && {
                 let here = volume(tet.map(|v| (Vec3::from_array(rounded[v as usize]) - corner).as_dvec3()));
-                there.abs() > NEARLY_FLAT * size.element_product() && (here - there).abs() > CHANGE * there.abs()
+                (here - there).abs() > CHANGE * there.abs()
             };
             (size.max_element() < small, changed)
         };
-        let count = |(tet, &id): (&[u32; 4], &u32)| {
-            let (small, changed) = of(tet);
-            (usize::from(small), usize::from(changed), if changed { id } else { u32::MAX })
+        let count = |(mut small, mut changed): (usize, Vec<u32>), (t, tet): (usize, &[u32; 4])| {
+            let (is_small, is_changed) = of(tet);
+            small += usize::from(is_small);
+            changed.extend(is_changed.then_some(t as u32));
+            (small, changed)
         };
-        let add = |a: (usize, usize, u32), b: (usize, usize, u32)| (a.0 + b.0, a.1 + b.1, a.2.min(b.2));
-        let (small, changed, first) = self.tets.par_iter().zip(&self.ids).map(count).reduce(|| (0, 0, u32::MAX), add);
+        let add = |(small, mut changed): (usize, Vec<u32>), (others, more): (usize, Vec<u32>)| {
+            changed.extend(more);
+            (small + others, changed)
+        };
+        let new = || (0, Vec::new());
+        let (small, changed) = self.tets.par_iter().enumerate().fold(new, count).reduce(new, add);
+        let changed = self.without_slivers(changed, THICK * farthest);
         let all = self.tets.len();
         let too_many = |small: usize| small > LEAST_SMALL && 2 * small > all;
         let slow = (too_many(small) && too_many(self.small_in_leaves(rounded))).then(|| {
@@ -61,13 +70,34 @@ impl Assembly {
                 1.0 / SMALL
             )
         });
-        let wrong = (changed > 0).then(|| {
+        let wrong = changed.first().map(|&first| {
             format!(
-                "{changed} of {all} tetrahedra are so small beside the mesh that single precision changes their shape, the first of cell \
-                 {first}: places in them are wrong by as much; remove parts that lie far away, or take them as a mesh of their own"
+                "{} of {all} tetrahedra are so small or thin beside the mesh that single precision changes their shape, the first of cell \
+                 {}: places in them are wrong by as much; remove parts that lie far away, take these as a mesh of their own, or turn thin \
+                 ones parallel to an axis",
+                changed.len(),
+                self.ids[first as usize]
             )
         });
         slow.into_iter().chain(wrong).collect()
+    }
+
+    /// Of tetrahedra that rounding changes, those with a point at which all are about as thin: six times their volume is less
+    /// than `height` times their largest extent squared. Nearly flat ones between thick ones, as in most meshes, do no harm:
+    /// there is hardly anything in them.
+    fn without_slivers(&self, mut changed: Vec<u32>, height: f64) -> Vec<u32> {
+        if changed.is_empty() {
+            return changed;
+        }
+        let mut is_thick = vec![false; self.points.len()];
+        for tet in &self.tets {
+            let corners = tet.map(|v| DVec3::from_array(self.points[v as usize]));
+            if volume(corners).abs() >= height * extent(&corners).length_squared() {
+                tet.iter().for_each(|&v| is_thick[v as usize] = true);
+            }
+        }
+        changed.retain(|&t| self.tets[t as usize].iter().any(|&v| !is_thick[v as usize]));
+        changed
     }
 
     /// How many cells are small beside the smallest leaves at their place.
@@ -109,6 +139,12 @@ pub(super) fn remark_on_resolution(array: &Array) -> Option<String> {
         let rounded = "which are rounded to single precision, so that numbers beside each other become one";
         beyond.then(|| format!("array `{}` has whole numbers beyond {MOST_WHOLE}, {rounded}", excerpt(array.name.as_bytes())))
     })
+}
+
+/// The size of the box around some points.
+fn extent(corners: &[DVec3; 4]) -> DVec3 {
+    let of = |pick: fn(DVec3, DVec3) -> DVec3| corners.iter().fold(corners[0], |found, &corner| pick(found, corner));
+    of(DVec3::max) - of(DVec3::min)
 }
 
 /// Six times the signed volume.

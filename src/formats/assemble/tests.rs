@@ -77,6 +77,33 @@ fn small_cells_in_the_middle_are_remarked_on() {
     }
 }
 
+/// A plate whose box is thick, as it lies askew. A tetrahedron between the four corners of a hexahedron's face is flat but
+/// for rounding, and so is each in a mesh of thick cells.
+#[test]
+fn thin_plates_askew_are_remarked_on() {
+    let source = Source::new("plate".as_ref(), Vec::new());
+    let n = 6;
+    let point = |i: usize, thickness: f64| {
+        let [x, y, z] = [i % (n + 1), i / (n + 1) % (n + 1), i / (n + 1) / (n + 1)].map(|i| i as f64 / n as f64);
+        let ([x, y], z) = ([0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y], n as f64 * thickness * z);
+        [0.28 * x + 0.96 * z, y, 0.28 * z - 0.96 * x].map(|x| x + 0.1)
+    };
+    let corners = [0, 1, n + 2, n + 1].map(|i| i as i64);
+    for (thickness, remarks) in [(1e-7, 1), (1e-6, 1), (1e-4, 0), (1e-2, 0), (1.0 / 6.0, 0)] {
+        let mut assembly = Assembly::new(&source, &LoadOptions::default(), "a plate".into());
+        assembly.set_points((0..2 * (n + 1) * (n + 1)).map(|i| point(i, thickness)).collect());
+        for first in (0..n * (n + 1)).filter(|i| i % (n + 1) < n).map(|i| i as i64) {
+            let bottom = corners.map(|i| first + i);
+            let top = bottom.map(|i| i + ((n + 1) * (n + 1)) as i64);
+            assembly.push(crate::formats::cells::vtk(12).unwrap(), &[bottom, top].concat()).unwrap();
+            assembly.push(crate::formats::cells::vtk(10).unwrap(), &bottom).unwrap();
+        }
+        let warnings = assembly.finish().unwrap().1.warnings;
+        let found = warnings.iter().filter(|w| w.contains("so small or thin beside the mesh"));
+        assert_eq!((found.count(), warnings.len()), (remarks, remarks), "{thickness}: {warnings:?}");
+    }
+}
+
 #[test]
 fn fields_that_vary_little_are_remarked_on() {
     let of = |components: usize, values: &[f64]| remark_on_resolution(&Array::rounded("p".into(), On::Points, components, values));
