@@ -188,8 +188,8 @@ pub struct OlbvhTreeInfo {
     /// Device time of the construction in milliseconds.
     pub build_ms: f64,
     /// Device address for `olbvh_open` of olbvh.glsl, valid until the tree is freed; 0 where the device has no buffer
-    /// addresses. If the mesh was reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
-    /// (`olbvh_scene_arrays`).
+    /// addresses. If the mesh was reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns
+    /// NaN; scenes can have one (`olbvh_scene_arrays`).
     pub address: u64,
 }
 

@@ -173,7 +173,7 @@ impl Assembly {
             ));
         }
         if self.tangled > 0 {
-            let remedy = "volumes and values there are wrong; split them into convex cells first";
+            let remedy = "volumes, owners and values there may be wrong; split them into convex cells first";
             self.warnings
                 .push(format!("{} split cells are so warped, or so far from convex, that pieces of them overlap: {remedy}", self.tangled));
         }

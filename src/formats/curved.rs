@@ -142,9 +142,10 @@ impl Surface {
         // Nodes besides those of edges are in the middle of quadrilaterals, or of all faces, or of these and the cell.
         let more = places.len().checked_sub(corners + edges.len())?;
         let quads = shape.faces().iter().filter(|face| face.len() == 4).count();
-        let has_node = |face: &&&[u8]| more > 0 && (more != quads || face.len() == 4);
+        let has_node = |face: &[u8]| more > 0 && (more != quads || face.len() == 4);
         let mut middles: Vec<_> = edges.iter().map(|edge| mean(places, edge.iter().copied())).collect();
-        middles.extend(shape.faces().iter().filter(has_node).map(|face| mean(places, face.iter().map(|&c| usize::from(c)))));
+        let with_node = shape.faces().iter().filter(|face| has_node(face));
+        middles.extend(with_node.map(|face| mean(places, face.iter().map(|&c| usize::from(c)))));
         if more > shape.faces().len() {
             middles.push(mean(places, 0..corners));
         }
@@ -157,7 +158,7 @@ impl Surface {
             let around = sides(face).map(of_edge).collect::<Option<Vec<usize>>>()?;
             let before = |k: usize| around[(k + around.len() - 1) % around.len()];
             let corner = |k: usize| usize::from(face[k]);
-            if let Some(node) = if has_node(&face) { others.next().flatten() } else { None } {
+            if let Some(node) = if has_node(face) { others.next().flatten() } else { None } {
                 faces.extend((0..face.len()).flat_map(|k| [vec![before(k), corner(k), node], vec![corner(k), around[k], node]]));
                 continue;
             }

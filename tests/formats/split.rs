@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::small::{faces, shared, volume};
+use crate::small::{CORNERS, faces, shared, volume};
 use olbvh::formats::{Curved, Fate, LoadOptions, Loaded, load, load_bytes};
 use olbvh::mesh::Mesh;
 
@@ -216,20 +216,7 @@ fn curved_tetrahedra_use_all_their_nodes() {
 /// their edges in any order. The field is x² + yz.
 #[test]
 fn quadratic_cells_fit_each_other() {
-    let corners = [
-        [0., 0., 0.],
-        [1., 0., 0.],
-        [1., 1., 0.],
-        [0., 1., 0.],
-        [0., 0., 1.],
-        [1., 0., 1.],
-        [1., 1., 1.],
-        [0., 1., 1.],
-        [2., 0.5, 0.],
-        [2., 0.5, 1.],
-        [0.5, 0.5, 2.],
-        [2., 0.5, 2.],
-    ];
+    let corners = [&CORNERS[..8], &[[2., 0.5, 0.], [2., 0.5, 1.], [0.5, 0.5, 2.], [2., 0.5, 2.]]].concat();
     let quad = |a, b, c, d| vec![[a, b], [b, c], [c, d], [d, a]];
     let cells: [(u8, Vec<usize>, Vec<[usize; 2]>); 4] = [
         (25, (0..8).collect(), [quad(4, 5, 6, 7), vec![[0, 4], [1, 5], [2, 6], [3, 7]], quad(0, 1, 2, 3)].concat()),
@@ -238,7 +225,7 @@ fn quadratic_cells_fit_each_other() {
         (24, vec![5, 6, 10, 11], vec![[10, 11], [5, 6], [6, 10], [10, 5], [5, 11], [6, 11]]),
     ];
     for bend in [0.0, 0.04] {
-        let mut points = corners.to_vec();
+        let mut points = corners.clone();
         let mut middles = HashMap::new();
         let mut middle = |&[i, j]: &[usize; 2]| {
             *middles.entry([i.min(j), i.max(j)]).or_insert_with(|| {
@@ -271,7 +258,7 @@ fn quadratic_cells_fit_each_other() {
 
 /// Corners of a cell of one of four quadratic kinds, and what its other nodes are in the middle of.
 fn nodes_of(kind: u8) -> (Vec<[f64; 3]>, Vec<Vec<usize>>) {
-    let cube = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0., 0., 1.], [1., 0., 1.], [1., 1., 1.], [0., 1., 1.]];
+    let cube = &CORNERS[..8];
     let ring = |n: usize| (0..2 * n).map(move |i| vec![i, i / n * n + (i + 1) % n]).chain((0..n).map(move |i| vec![i, i + n]));
     let quads = |n: usize| (0..n).map(move |i| vec![i, (i + 1) % n, (i + 1) % n + n, i + n]);
     let wedge = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 0., 1.], [1., 0., 1.], [1., 1., 1.]];

@@ -2,7 +2,7 @@
 
 use olbvh::baseline::{Lbvh, LbvhArrays};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
-use olbvh::gpu::{Binding, Gpu, GpuOptions};
+use olbvh::gpu::Gpu;
 use olbvh::layout::NONE;
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
@@ -204,14 +204,13 @@ fn check_overlap(name: &str, a: &HostAndDevice, b: &HostAndDevice) -> usize {
     found.overlap.a.len()
 }
 
-fn everything(binding: Binding) {
-    let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
+fn everything(gpu: &Gpu) {
     let (mut found, mut touched, mut hits) = (0, 0, 0);
     let mut grid = kuhn_jittered([6, 5, 4], 0.3, 9).unwrap();
     grid.points.iter_mut().for_each(|p| *p = [p[0] - 2.6, p[1] - 3.3, p[2] - 1.4]);
-    let grid = HostAndDevice::new(&gpu, grid);
+    let grid = HostAndDevice::new(gpu, grid);
     for (name, mesh) in meshes() {
-        let both = HostAndDevice::new(&gpu, mesh);
+        let both = HostAndDevice::new(gpu, mesh);
         check_tree(name, &both);
         check_owners(name, &both);
         found += if name == "identical-9000" { 0 } else { check_picture(name, &both) };
@@ -220,14 +219,11 @@ fn everything(binding: Binding) {
         hits += check_overlap(name, &both, &grid);
     }
     assert!(found > 10_000 && touched > 1000 && hits > 1000, "{found} samples, {touched} voxels, {hits} hits");
-    let messages = gpu.validation_messages();
-    assert!(messages.is_empty(), "{messages:#?}");
 }
 
 /// Two surfaces that cut through tetrahedra, lit or not, and half transparent, so that both are visible.
-fn surfaces(binding: Binding) {
-    let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
-    let both = HostAndDevice::new(&gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap());
+fn surfaces(gpu: &Gpu) {
+    let both = HostAndDevice::new(gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap());
     let values = both.mesh.points.iter().map(|p| p[0] * p[1] - p[2]).collect();
     let field = Field { name: "saddle".into(), on: On::Points, values };
     for shading in [true, false] {
@@ -237,26 +233,8 @@ fn surfaces(binding: Binding) {
         let beyond_one = drawn.colors.iter().filter(|c| c[3] > 0.65).count();
         assert!(beyond_one > 20 && drawn.colors.iter().any(|c| c[3] == 0.0), "{beyond_one} pixels with several surfaces");
     }
-    let messages = gpu.validation_messages();
-    assert!(messages.is_empty(), "{messages:#?}");
 }
 
-#[test]
-fn surfaces_by_address() {
-    surfaces(Binding::Address);
-}
+both_bindings!(surfaces, surfaces_by_address, surfaces_by_descriptors);
 
-#[test]
-fn surfaces_by_descriptors() {
-    surfaces(Binding::Descriptors);
-}
-
-#[test]
-fn baseline_by_address() {
-    everything(Binding::Address);
-}
-
-#[test]
-fn baseline_by_descriptors() {
-    everything(Binding::Descriptors);
-}
+both_bindings!(everything, baseline_by_address, baseline_by_descriptors);

@@ -93,8 +93,7 @@ fn answers_are_those_of_the_whole() {
     passed_over(&gpu);
     drawn(&gpu, &mesh);
     hidden(&gpu, &mesh);
-    let messages = gpu.validation_messages();
-    assert!(messages.is_empty(), "{messages:#?}");
+    crate::silent(&gpu);
 }
 
 fn located(gpu: &Gpu, mesh: &Mesh) {

@@ -286,7 +286,7 @@ fn check(binding: Binding) {
         }
         assert!(nearest[1] == nearest[0] && nearest[2] == nearest[0], "{binding:?} {lists:?}: other leaves with another stack");
     }
-    assert!(gpu.validation_messages().is_empty(), "{:#?}", gpu.validation_messages());
+    crate::silent(&gpu);
 }
 
 #[test]

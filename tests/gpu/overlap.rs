@@ -2,7 +2,7 @@
 //! the conformance suite lacks.
 
 use olbvh::conformance::{HostAndDevice, check_overlap};
-use olbvh::gpu::{Binding, Gpu, GpuOptions};
+use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::query::{SILENT, overlap};
@@ -12,32 +12,21 @@ fn moved(mut mesh: Mesh, at: [f32; 3], scale: f32) -> Mesh {
     mesh
 }
 
-fn everything(binding: Binding) {
-    let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
+fn everything(gpu: &Gpu) {
     let mut hits = 0;
     for (alpha, assign) in [(0.0, Assign::Aabb), (1.0, Assign::Exact), (10.0, Assign::Planes)] {
         let options = BuildOptions { alpha, assign, lists: Lists::All, ..BuildOptions::default() };
-        let cube = HostAndDevice::new(&gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap(), &options).unwrap();
+        let cube = HostAndDevice::new(gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap(), &options).unwrap();
         for (i, scale) in [1.0, 0.3, 1.7].into_iter().enumerate() {
             let at = [0.4 + i as f32, 0.37 * i as f32 - 1.0, 1.1];
-            let other = HostAndDevice::new(&gpu, moved(kuhn_jittered([7, 6, 8], 0.2, 3).unwrap(), at, scale), &options).unwrap();
+            let other = HostAndDevice::new(gpu, moved(kuhn_jittered([7, 6, 8], 0.2, 3).unwrap(), at, scale), &options).unwrap();
             hits += check_overlap(&cube, &other).unwrap();
         }
     }
     assert!(hits > 500, "{hits}");
-    let messages = gpu.validation_messages();
-    assert!(messages.is_empty(), "{messages:#?}");
 }
 
-#[test]
-fn by_address() {
-    everything(Binding::Address);
-}
-
-#[test]
-fn by_descriptors() {
-    everything(Binding::Descriptors);
-}
+both_bindings!(everything, by_address, by_descriptors);
 
 #[test]
 fn long_lists_take_several_submissions() {

@@ -113,8 +113,7 @@ fn no_point_is_lost(binding: Binding, n: usize, which: usize) {
     if n < FULL {
         println!("NOT ALL: {n} of {FULL} points in the four tests; OLBVH_TEST_POINTS={FULL} runs them all");
     }
-    let messages = gpu.validation_messages();
-    assert!(messages.is_empty(), "{messages:#?}");
+    crate::silent(&gpu);
 }
 
 #[test]

@@ -95,8 +95,7 @@ fn what_rays_find_is_right(binding: Binding, method: RayMethod) {
         let stages: Vec<&str> = rays.times().stages.iter().map(|s| s.name.as_str()).collect();
         assert_eq!(stages, ["rays.faces", "acceleration.build", "acceleration.compact", "acceleration.scene"]);
     }
-    let messages = gpu.validation_messages();
-    assert!(messages.is_empty(), "{messages:#?}");
+    crate::silent(&gpu);
 }
 
 #[test]
@@ -124,6 +123,5 @@ fn meshes_without_cells_have_no_owners() {
             assert_eq!((rays.faces(), owners), (0, vec![u32::MAX; 2]));
         }
     }
-    let messages = gpu.validation_messages();
-    assert!(messages.is_empty(), "{messages:#?}");
+    crate::silent(&gpu);
 }

@@ -7,7 +7,7 @@ use crate::submit::submit;
 use bytemuck::Pod;
 use olbvh::baseline::Lbvh;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
-use olbvh::gpu::{Arena, Binding, BufferRef, Gpu, GpuOptions};
+use olbvh::gpu::{Arena, BufferRef, Gpu, GpuOptions};
 use olbvh::layout::{OverlapStatus, RenderStatus, SliceStatus};
 use olbvh::mesh::{Bounds, Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
@@ -102,21 +102,20 @@ fn compare_owners(gpu: &Gpu, queries: &Queries, locator: &Locator<'_>, points: &
     all.len()
 }
 
-fn frames(binding: Binding) {
-    let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
+fn frames(gpu: &Gpu) {
     let mesh = kuhn_jittered([5, 4, 6], 0.2, 3).unwrap();
     let values: Vec<f32> = mesh.points.iter().map(|p| p[0] - 0.5 * p[2]).collect();
     let mut other = kuhn_jittered([4; 3], 0.3, 9).unwrap();
     other.points.iter_mut().for_each(|p| *p = p.map(|x| x - 1.3));
-    let frame = Frame::new(&gpu, &mesh);
-    let queries = Queries::new(&gpu, &frame, &values, &other, ROOM as u64);
+    let frame = Frame::new(gpu, &mesh);
+    let queries = Queries::new(gpu, &frame, &values, &other, ROOM as u64);
     let other_topology = topology(&other).unwrap();
     let other_tree = build(&other, &other_topology, queries.other_tree.options()).unwrap();
     let (mut listed, mut touched, mut met, mut cut, mut drawn) = (0, 0, 0, 0, [0; 2]);
     for i in 0..6 {
         let shown = moved(&mesh, i);
         let staging = gpu.upload("olbvh.test.staging", &shown.points).unwrap();
-        submit(&gpu, "olbvh.test.frame", |r| {
+        submit(gpu, "olbvh.test.frame", |r| {
             r.copy(staging.all(), frame.input.positions);
             r.barrier("frame.positions → frame.mesh");
             frame.record(r)?;
@@ -126,13 +125,13 @@ fn frames(binding: Binding) {
 
         let topology = topology(&shown).unwrap();
         let host = build(&shown, &topology, &BuildOptions::default()).unwrap();
-        let device = DeviceMesh::upload(&gpu, &shown, BadCells::Skip).unwrap();
-        let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+        let device = DeviceMesh::upload(gpu, &shown, BadCells::Skip).unwrap();
+        let tree = Tree::build(gpu, &device, &BuildOptions::default()).unwrap();
         let field = Field { name: "x".into(), on: On::Points, values: values.clone() };
         let slicer = Slicer::new(&shown, &topology, &host, Some(&field), queries.voxels, Extrapolate::Nearest).unwrap();
-        listed += compare_owners(&gpu, &queries, &Locator::new(&shown, &topology, &host), &shown.points);
-        touched += compare_slice(&gpu, &queries, &slicer, &values, &tree).touched;
-        let seen = compare_picture(&gpu, &queries, &values, &tree);
+        listed += compare_owners(gpu, &queries, &Locator::new(&shown, &topology, &host), &shown.points);
+        touched += compare_slice(gpu, &queries, &slicer, &values, &tree).touched;
+        let seen = compare_picture(gpu, &queries, &values, &tree);
         drawn = [drawn[0] + seen[0], drawn[1] + seen[1]];
 
         let (a, b) = (
@@ -140,15 +139,15 @@ fn frames(binding: Binding) {
             OverlapSide { mesh: &other, topology: &other_topology, tree: &other_tree },
         );
         let (sets, pairs) = (reference(a, b, false), reference(a, b, true).pairs.unwrap());
-        let hits = |k: usize, n: usize| bits(&read(&gpu, &queries, queries.sets.hits[k], n.div_ceil(32)));
+        let hits = |k: usize, n: usize| bits(&read(gpu, &queries, queries.sets.hits[k], n.div_ceil(32)));
         assert_eq!((hits(0, shown.tets.len()), hits(1, other.tets.len())), (sets.a.clone(), sets.b.clone()), "frame {i}");
         assert_eq!(overlap(&tree, &queries.other_tree, false, SILENT).unwrap().overlap, sets, "frame {i}");
-        let statuses = queries.sets.status.map(|part| read::<OverlapStatus>(&gpu, &queries, part, 1)[0]);
+        let statuses = queries.sets.status.map(|part| read::<OverlapStatus>(gpu, &queries, part, 1)[0]);
         assert!(statuses.iter().all(|s| s.unfinished == 0 && s.empty == 0));
 
-        let status: OverlapStatus = read(&gpu, &queries, queries.pairs.status, 1)[0];
+        let status: OverlapStatus = read(gpu, &queries, queries.pairs.status, 1)[0];
         assert_eq!((status.unfinished, status.unfilled, status.pairs), (0, 0, [pairs.len() as u32, 0]), "frame {i}");
-        let mut found: Vec<[u32; 2]> = read(&gpu, &queries, queries.found, pairs.len().min(ROOM));
+        let mut found: Vec<[u32; 2]> = read(gpu, &queries, queries.found, pairs.len().min(ROOM));
         found.chunk_by_mut(|x, y| x[0] == y[0]).for_each(<[_]>::sort_unstable);
         let whole = found.len() - found.iter().rev().take_while(|p| p[0] == found[found.len() - 1][0]).count();
         assert_eq!(found[..whole], pairs[..whole], "frame {i}");
@@ -158,19 +157,9 @@ fn frames(binding: Binding) {
     }
     assert!(listed > 1000 && touched > 1000 && met > 1000 && cut > 0 && cut < 6, "{touched} {met} {cut}");
     assert!(drawn.iter().all(|&samples| samples > 500), "{drawn:?}");
-    let messages = gpu.validation_messages();
-    assert!(messages.is_empty(), "{messages:#?}");
 }
 
-#[test]
-fn by_address() {
-    frames(Binding::Address);
-}
-
-#[test]
-fn by_descriptors() {
-    frames(Binding::Descriptors);
-}
+both_bindings!(frames, by_address, by_descriptors);
 
 /// Rounds in separate submissions, one at a time, end with the result of the owning calls.
 #[test]

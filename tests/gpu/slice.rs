@@ -87,8 +87,7 @@ fn by_address() {
     let loaded = olbvh::formats::load(&file, &olbvh::formats::LoadOptions::default()).unwrap();
     touched += check(&gpu, "flow_sphere_50k", &loaded.mesh, &[(0.0, Assign::Aabb), (2.0, Assign::Planes)], &settings());
     assert!(touched > 1000, "{touched}");
-    let messages = gpu.validation_messages();
-    assert!(messages.is_empty(), "{messages:#?}");
+    crate::silent(&gpu);
 }
 
 /// Voxels so small that most of those beside the mesh lie in a few leaves, whose octants and slabs decide about them.

@@ -74,7 +74,7 @@ fn every_row_gives_the_same_bytes() {
         assert_eq!(shaped.target().name, row.name());
         assert!(ask(&shaped, &mesh) == expected, "{}", row.name());
     }
-    assert!(gpu.validation_messages().is_empty(), "{:?}", gpu.validation_messages());
+    crate::silent(&gpu);
 }
 
 #[test]
