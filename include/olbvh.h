@@ -188,8 +188,8 @@ typedef struct olbvh_tree_info_data {
   double build_ms;
   /*
    Device address for `olbvh_open` of olbvh.glsl, valid until the tree is freed; 0 where the device has no buffer
-   addresses. If the mesh was reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
-   (`olbvh_scene_arrays`).
+   addresses. If the mesh was reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns
+   NaN; scenes can have one (`olbvh_scene_arrays`).
    */
   uint64_t address;
 } olbvh_tree_info_data;
