@@ -373,10 +373,11 @@ vec4 olbvh_barycentric(olbvh_Sides r) {
     return b;
 }
 
-// Barycentric coordinates of any point in the caller's order: those reported with an owner, however it was found.
+// Barycentric coordinates of any point in the caller's order: those reported with an owner, however it was found. A zero
+// has no sign, which Vulkan does not promise to keep.
 vec4 olbvh_barycentric(olbvh_Tet t, vec3 olbvh_p) {
     vec4 b = olbvh_barycentric(olbvh_sides_of(t.v, olbvh_bounds_of(t.v), olbvh_p));
-    return vec4(b[t.rank.x], b[t.rank.y], b[t.rank.z], b[t.rank.w]);
+    return vec4(olbvh_canonical(b[t.rank.x]), olbvh_canonical(b[t.rank.y]), olbvh_canonical(b[t.rank.z]), olbvh_canonical(b[t.rank.w]));
 }
 
 // The value at barycentric coordinates, interpolated from the values at the corners; exact where these are equal.

@@ -35,7 +35,8 @@
 //!
 //! /// `buffer` makes a buffer of yours of so many bytes.
 //! fn place(gpu: &Gpu, mesh: &Yours, buffer: impl Fn(u64) -> BufferRef) -> Result<PlacedScene> {
-//!     let plan = ScenePlan::usual(mesh.points, mesh.tets, 7); // level 7, or that of `Tree::build` for the undeformed mesh
+//!     // Leaves down to level 7. `ScenePlan::like` plans for trees like one that `Tree::build` has made of the mesh at rest.
+//!     let plan = ScenePlan::usual(mesh.points, mesh.tets, 7);
 //!     let bytes = plan.bytes(gpu)?;
 //!     plan.place(gpu, mesh.positions, mesh.cells, buffer(bytes.memory), buffer(bytes.scratch))
 //! }

@@ -49,6 +49,7 @@ uvec4 neighbours_of(uint t) {
         }
     }
     if (MATES != 0u || across != held) neighbours.at[t] = across;
+    if (MATES == 0u && across != held) status.at[0].parted = 1u;
     return across;
 }
 

@@ -51,6 +51,9 @@ Point point_at(Grid g, uint place) {
     return Point(i, at, normalise(g, at));
 }
 
+// Steps of a stride to a point from near it; none to what is not finite, which no comparison must find in a tetrahedron.
+uint hinted(Grid g, vec3 at) { return near_bounds(g, at) ? HINTED : 0u; }
+
 void main() {
     uint place = item_index() * RUN;
     if (place >= count) return;
@@ -65,7 +68,7 @@ void main() {
     bool in_leaf = part > 0u; // whether this stride started in the point's leaf
     if (GUIDE == HINTS && part == 0u) {
         from = guides.at[a.i];
-        left = from == NONE ? 0u : HINTED;
+        left = from == NONE ? 0u : hinted(g, a.at);
     }
     while (place < end) {
         Stand stand = stand_nowhere();
@@ -79,7 +82,7 @@ void main() {
                 owners.at[a.i] = stand.t;
                 barycentrics.at[a.i] = record(is_last ? barycentric(stand, sides) : vec4(1.0, 1.0, 0.0, 0.0));
                 if (++place < end) a = point_at(g, place);
-                left = HINTED;
+                left = hinted(g, a.at);
                 in_leaf = false;
             } else {
                 at_face = sides.near;
@@ -118,7 +121,7 @@ void main() {
             // If the list continues in the next part, the owner is not known yet.
             bool known = owner != NONE && (walks || range.y - range.x <= LEAST_PART);
             from = owner;
-            left = known ? HINTED : 0u;
+            left = known ? hinted(g, a.at) : 0u;
             in_leaf = false;
         }
     }

@@ -40,7 +40,7 @@ void find_ends(uint k, Sides here, float value, bool joins, out Place from, out 
     from = to = place_at(at, value);
     Sides next = sides_of(stand, normalise(grid.at[0], sample_at(view, origin, direction, k + 1u)));
     precise float rise = value_of(held_values, barycentric(next)) - value;
-    if (!(abs(rise) < 1e37)) return;
+    if ((floatBitsToUint(rise) & 0x7fffffffu) >= floatBitsToUint(1e37)) return; // by its bits: it may be NaN
     if (!joins) {
         precise vec4 change = next.w - here.w;
         precise vec4 behind = here.w - change;

@@ -14,6 +14,7 @@ struct MeshStatus {
     uint crowded;   // Vertices with so many thin corners that more tetrahedra may meet there than a star can have.
     uint overflow;  // Not 0: the table of faces was full, which it can be beyond 429 million tetrahedra only.
     uint branched;  // Faces that more than two tetrahedra share, which are then not neighbours there.
+    uint parted;    // Not 0: since neighbours were searched for, some were parted, as tetrahedra became bad for a while.
 };
 
 // The result of a build (SPEC 2.4, 2.5).

@@ -162,10 +162,11 @@ vec4 barycentric(Sides r) {
     return b;
 }
 
-// Barycentric coordinates of any point in the caller's order: those reported with an owner, however it was found.
+// Barycentric coordinates of any point in the caller's order: those reported with an owner, however it was found. A zero
+// has no sign, which Vulkan does not promise to keep.
 vec4 barycentric(Tet t, vec3 p) {
     vec4 b = barycentric(sides_of(t.v, bounds_of(t.v), p));
-    return vec4(b[t.rank.x], b[t.rank.y], b[t.rank.z], b[t.rank.w]);
+    return vec4(canonical(b[t.rank.x]), canonical(b[t.rank.y]), canonical(b[t.rank.z]), canonical(b[t.rank.w]));
 }
 
 // The value at barycentric coordinates, interpolated from the values at the corners; exact where these are equal.

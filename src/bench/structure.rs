@@ -124,7 +124,7 @@ impl Structure {
     /// The tetrahedra of the two meshes that intersect the other mesh; `None` if the structures cannot find them.
     pub(super) fn overlap(&self, other: &Self) -> Result<Option<Overlapped>> {
         match (self, other) {
-            (Self::Octree(a), Self::Octree(b)) => query::overlap(a, b, false, SILENT).map(Some),
+            (Self::Octree(a), Self::Octree(b)) => query::overlap(a, b, SILENT).map(Some),
             (Self::Lbvh(a), Self::Lbvh(b)) => a.overlap(b, SILENT).map(Some),
             _ => Ok(None),
         }

@@ -5,6 +5,7 @@
 use super::cut::{Block, Placed, Source};
 use super::size::least_bytes;
 use super::{ANYWHERE, Cost, Cutter, attempt};
+use crate::build::Tree;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::Mesh;
@@ -79,11 +80,16 @@ pub fn overlap(gpu: &Gpu, asked: &OverlapRequest<'_>, report: Progress<'_>) -> R
     let whole = attempt(gpu, least, || {
         let a = cost.place(gpu, meshes[0], options, 0)?;
         let b = cost.place(gpu, meshes[1], options, 1)?;
-        query::overlap(&a.tree, &b.tree, pairs, &|done, all| tell(done as f64 / all.max(1) as f64))
+        find(pairs)(&a.tree, &b.tree, &|done, all| tell(done as f64 / all.max(1) as f64))
     })?;
     let found = if let Ok(found) = whole { found } else { in_blocks(gpu, asked, &tell, &mut cost)? };
     tell(1.0)?;
     Ok((found, cost.with_peak(gpu)))
+}
+
+/// The query of a whole tree.
+fn find(pairs: bool) -> fn(&Tree, &Tree, Progress<'_>) -> Result<Overlapped> {
+    if pairs { query::overlap_pairs } else { query::overlap }
 }
 
 /// The overlap of all pairs of blocks. `tell` receives the share of the work that is done.
@@ -161,7 +167,7 @@ fn visit(
         }
     }
     let [Some(a), Some(b)] = placed else { return Ok(()) };
-    let Overlapped { overlap: found, times } = query::overlap(&a.tree, &b.tree, all.overlap.pairs.is_some(), SILENT)?;
+    let Overlapped { overlap: found, times } = find(all.overlap.pairs.is_some())(&a.tree, &b.tree, SILENT)?;
     log::debug!("blocks of {} and {} tetrahedra", nodes[0].tets(), nodes[1].tets());
     all.times.add(times);
     all.overlap.a.extend(found.a.into_iter().map(|t| a.tet(t)));

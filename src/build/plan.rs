@@ -38,10 +38,10 @@ impl Capacity {
         Self { candidates: entries, entries, nodes: u32::try_from(nodes).unwrap_or(u32::MAX - 1), level }
     }
 
-    /// Room for [`usual_capacity`] candidates and 8 entries per tetrahedron, which is enough for most meshes with
-    /// `Lists::Boundary`; trees over other meshes get coarser.
+    /// Room for [`usual_capacity`] candidates and 8 entries per tetrahedron, but at least 65,536 of them, which is enough for
+    /// most meshes with `Lists::Boundary`; trees over other meshes get coarser.
     pub fn usual(tets: u32, level: u32) -> Self {
-        Self { candidates: usual_capacity(tets), ..Self::for_entries(tets.saturating_mul(8).min(MAX_ENTRIES), level) }
+        Self { candidates: usual_capacity(tets), ..Self::for_entries(tets.saturating_mul(8).clamp(1 << 16, MAX_ENTRIES), level) }
     }
 
     /// With room for [`usual_capacity`] candidates where `options` filter them, so that a recorded build is as deep as

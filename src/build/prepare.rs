@@ -173,7 +173,8 @@ pub fn cmd_prepare_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshAr
 ///
 /// So are the results, as long as the same tetrahedra are bad. One that becomes bad, since a point of it is no longer
 /// finite, loses its neighbours, and they lose it, until [`cmd_prepare_mesh`] is recorded again. Until then these count
-/// as boundary tetrahedra, so no point is lost. [`MeshStatus::bad`] tells.
+/// as boundary tetrahedra, so no point is lost, but the tree is larger, and closest places may be taken for those of the
+/// surface that lie inside. [`MeshStatus::parted`] tells, also when no tetrahedron is bad any more.
 ///
 /// # Errors
 /// Those of [`cmd_prepare_mesh`].
@@ -239,7 +240,7 @@ impl<'a> Stage0<'a> {
     /// Everything but the search for neighbours.
     pub fn shift(&self, r: &mut Recorder<'_>) -> Result<()> {
         r.stage("mesh.clear", |r| {
-            r.fill(self.arrays.status.part(0, offset_of!(MeshStatus, overflow) as u64), 0); // that stays as it was
+            r.fill(self.arrays.status.part(0, offset_of!(MeshStatus, overflow) as u64), 0); // that and what follows stay as they were
             self.clear(r, None);
             Ok(())
         })?;

@@ -1,8 +1,8 @@
 //! A mesh and its tree in memory of a host, which rebuilds them as often as it likes.
 
 use super::{
-    BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, check_points, cmd_build, cmd_move_mesh,
-    cmd_prepare_mesh,
+    BuildScratch, Capacity, MAX_ENTRIES, MeshArrays, MeshInput, MeshScratch, MeshView, Tree, TreeMemory, check_points, cmd_build,
+    cmd_move_mesh, cmd_prepare_mesh,
 };
 use crate::error::Result;
 use crate::gpu::{Arena, BufferRef, Gpu, Recorder};
@@ -46,9 +46,21 @@ pub struct PlacedScene {
 
 impl ScenePlan {
     /// A plan with [`Capacity::usual`] and the usual options, for points of three floats each. `level` is the deepest
-    /// that leaves may have, for example that of a [`super::Tree`] over the mesh at rest.
+    /// that leaves may have; how deep they are is chosen by α, which is coarse for thin bodies and small meshes. See
+    /// [`ScenePlan::like`].
     pub fn usual(points: u32, tets: u32, level: u32) -> Self {
         Self { points, stride: 3, tets, capacity: Capacity::usual(tets, level), options: BuildOptions::default() }
+    }
+
+    /// A plan for trees like this one, over the same cells and points that may have moved: leaves are on its level, with
+    /// room for `slack` times its entries, 1.5 for example, or for one per tetrahedron where that is more.
+    /// Points have three floats each.
+    pub fn like(tree: &Tree, slack: f32) -> Self {
+        let (input, status) = (tree.mesh().input, tree.status());
+        let entries = ((f64::from(status.entries) * f64::from(slack.max(1.0))) as u32).max(input.tets).min(MAX_ENTRIES);
+        let options = BuildOptions { level: Some(status.level), capacity: None, budget: None, ..*tree.options() };
+        let capacity = Capacity::for_entries(entries, status.level).with_candidates(input.tets, &options);
+        Self { points: input.points, stride: 3, tets: input.tets, capacity, options }
     }
 
     /// The memory to allocate, with usage flags [`Gpu::usage`], at offsets that are multiples of

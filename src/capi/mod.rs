@@ -32,6 +32,7 @@ use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
 use crate::gpu::{Buffer, Gpu, GpuOptions};
 use crate::grid::MAX_LEVEL;
+use crate::layout::{NONE, constants::voxels::SLICE_TOUCHED};
 use crate::mesh::{Bounds, Mesh, On};
 use crate::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
 use std::borrow::Cow;
@@ -361,7 +362,12 @@ pub extern "C" fn olbvh_version() -> *const c_char {
 }
 
 /// Version of this interface. A header and a library with different versions are incompatible.
-pub const OLBVH_ABI: u32 = 4;
+pub const OLBVH_ABI: u32 = 5;
+/// What stands for an owner where there is none.
+pub const OLBVH_NONE: u32 = u32::MAX;
+/// The bit of a voxel's owner that says that the voxel is merely touched.
+pub const OLBVH_TOUCHED: u32 = 0x8000_0000;
+const _: () = assert!(OLBVH_NONE == NONE && OLBVH_TOUCHED == SLICE_TOUCHED);
 
 /// Returns the `OLBVH_ABI` of the library, for comparison with that of the header.
 #[unsafe(no_mangle)]

@@ -1,9 +1,8 @@
 //! The owning calls of the C interface: each queries a tree that olbvh owns, waits, and fills the caller's arrays.
 
-use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, array_mut, border, handle, text, tolerance};
+use super::{HeldMesh, OLBVH_TOUCHED, OlbvhStatus, OlbvhTree, array, array_mut, border, handle, text, tolerance};
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
-use crate::layout::constants::voxels::SLICE_TOUCHED;
 use crate::mesh::{Bounds, Field, Mesh, On};
 use crate::query::{LocateOptions, SILENT, locate, nearest, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
@@ -218,9 +217,10 @@ pub unsafe extern "C" fn olbvh_locate(
     })
 }
 
-/// Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), wherever they lie:
-/// the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away, a length like the coordinates. That is limited
-/// to between half of the mesh's largest extent and all of it. `barycentrics` gets four floats per point, in the order of
+/// Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), inside or outside:
+/// the tetrahedron with it, or `OLBVH_NONE` if none is at most `within` away, a length like the coordinates. However large
+/// `within` is, places farther away than some limit, which lies between half of the mesh's largest extent and all of it,
+/// are not found. `barycentrics` gets four floats per point, in the order of
 /// the tetrahedron's vertices, and `distances` one, NaN without a place; each of these two may be null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_nearest(
@@ -327,7 +327,7 @@ pub unsafe extern "C" fn olbvh_slice(
         let (mut answers, mut results) = (answers.iter_mut(), results.iter_mut());
         let extrapolate = if linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
         let mut sink = |band: Band| {
-            let touched = |kind: u8| if kind == TOUCHED { SLICE_TOUCHED } else { 0 };
+            let touched = |kind: u8| if kind == TOUCHED { OLBVH_TOUCHED } else { 0 };
             let owners = band.owners.iter().zip(&band.kinds).map(|(&owner, &kind)| mesh.cell(owner) | touched(kind));
             fill(&mut answers, owners);
             fill(&mut results, band.values);
@@ -350,7 +350,7 @@ pub unsafe extern "C" fn olbvh_overlap(a: *const OlbvhTree, b: *const OlbvhTree,
         let words = |tree: &OlbvhTree| tree.mesh.device.input().tets.div_ceil(32) as usize;
         // SAFETY: the caller keeps the rules of `capi`.
         let hits = unsafe { [array_mut(hits_a, words(a), "hits_a")?, array_mut(hits_b, words(b), "hits_b")?] };
-        let found = overlap(&a.tree, &b.tree, false, SILENT)?.overlap;
+        let found = overlap(&a.tree, &b.tree, SILENT)?.overlap;
         for ((hits, tree), found) in hits.into_iter().zip([a, b]).zip([found.a, found.b]) {
             let mut bits = vec![0; words(tree)];
             for cell in found.into_iter().map(|tet| tree.mesh.cell(tet)) {

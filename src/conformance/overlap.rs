@@ -9,7 +9,7 @@ use crate::gpu::Gpu;
 use crate::mesh::{Mesh, kuhn_jittered};
 use crate::named::named;
 use crate::options::{Assign, BuildOptions, Lists};
-use crate::query::{SILENT, overlap};
+use crate::query::{SILENT, overlap, overlap_pairs};
 use crate::reference::boundary::{Topology, topology};
 use crate::reference::build::build;
 use crate::reference::overlap::{OverlapSide, overlap as reference};
@@ -104,7 +104,8 @@ fn compare_overlaps(a: Sides<'_>, b: Sides<'_>) -> Verdict<usize> {
     let kinds: &[bool] = if a.0.tree.lists == Lists::All { &[false, true] } else { &[false] };
     for &pairs in kinds {
         let expected = reference(a.0, b.0, pairs);
-        let found = overlap(a.1, b.1, pairs, SILENT)?.overlap;
+        let find = if pairs { overlap_pairs } else { overlap };
+        let found = find(a.1, b.1, SILENT)?.overlap;
         hits = expected.a.len();
         let stage = if pairs { "query.overlap_pairs" } else { "query.overlap_search" };
         compare(stage, "a", &expected.a, &found.a)?;

@@ -55,6 +55,9 @@ impl OwnersMemory {
 /// [`OwnersMemory::located`] and [`OwnersMemory::total`] are complete once these commands have been executed; for more
 /// than [`OwnersMemory::most_points`] the total may be too small by a multiple of 2^32.
 ///
+/// Where tetrahedra overlap each other, only a tree with [`crate::options::Lists::All`] finds all of them: a leaf with a
+/// seed tells those that are connected by faces around the point.
+///
 /// Entry: mesh, tree and points are read by compute shaders. First use of `memory`: transfer writes. Last use: compute
 /// reads and writes; no barrier before or after.
 ///
@@ -139,7 +142,12 @@ pub struct AllOwners {
 }
 
 /// Finds every tetrahedron that contains each point; for a point that none contains, the owner within the tolerance alone,
-/// if there is one. `report` receives the number of points done and their total.
+/// if there is one.
+///
+/// Where tetrahedra overlap each other, only a tree with [`crate::options::Lists::All`] finds all of them: a leaf with a
+/// seed tells those that are connected by faces around the point.
+///
+/// `report` receives the number of points done and their total.
 ///
 /// # Errors
 /// As [`super::locate`].

@@ -77,7 +77,8 @@ impl LocateMethod {
 /// How points are located.
 #[derive(Clone, Copy, Debug)]
 pub struct LocateOptions {
-    /// How far below 0 the smallest barycentric coordinate of an owner may be in a boundary leaf.
+    /// How far below 0 the smallest barycentric coordinate of an owner may be in a boundary leaf: a finite number, at
+    /// least 0.
     pub tolerance: f32,
     /// How owners are searched for.
     pub method: LocateMethod,
@@ -87,6 +88,14 @@ impl Default for LocateOptions {
     fn default() -> Self {
         Self { tolerance: TOLERANCE, method: LocateMethod::Suited }
     }
+}
+
+/// Rejects a tolerance that is not a finite number of at least 0.
+pub(crate) fn check_tolerance(tolerance: f32) -> Result<()> {
+    if tolerance.is_finite() && tolerance >= 0.0 {
+        return Ok(());
+    }
+    Err(Error::Invalid(format!("a tolerance of {tolerance}; it is a finite number, at least 0")))
 }
 
 /// Points in device memory.
@@ -142,12 +151,14 @@ impl LocateOutput {
 /// after.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a stride below 3, for parts of fewer points, or for a method that sorts without an order;
+/// [`Error::Invalid`] for a stride below 3, for parts of fewer points, a tolerance out of its range, or a method that sorts
+/// without an order;
 /// [`Error::TooLarge`] for points of more than 2^31 floats, or for lists too long for [`LocateMethod::Traversal`].
 pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, output: &LocateOutput, options: &LocateOptions) -> Result<()> {
     let PointInput { points, stride, count, hints, order } = *input;
     let LocateOutput { owners, barycentrics } = *output;
     let tolerance = options.tolerance;
+    check_tolerance(tolerance)?;
     input.check()?;
     output.check(count)?;
     let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
@@ -284,7 +295,8 @@ pub struct Located {
 /// to points or tetrahedra. `report` receives the number of points done and their total.
 ///
 /// # Errors
-/// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length.
+/// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length or the tolerance is
+/// out of its range.
 pub fn locate(
     tree: &Tree,
     points: &[[f32; 3]],

@@ -18,7 +18,7 @@ pub(crate) use nearest::nearest_in;
 pub use nearest::{Nearest, NearestMemory, cmd_nearest, nearest};
 pub(crate) use order::code_bits;
 pub use order::{PointOrder, cmd_sort_points};
-pub use overlap::{OverlapMemory, Overlapped, PairMemory, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
+pub use overlap::{OverlapMemory, Overlapped, PairMemory, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap, overlap_pairs};
 pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};
 pub(crate) use slice::{Slicing, slice_in};
 pub use visible::{cmd_visible, visible_bytes};

@@ -39,8 +39,13 @@ impl NearestMemory {
 /// Records the search for the place of the surface that is closest to each point, at most `within` away, in units of the
 /// mesh, and at most 1 / [`crate::layout::Grid::scale`], which is between half of the mesh's largest extent and all of it:
 /// of the faces without neighbour the one with the smallest squared distance (ties: that of the tetrahedron with the lowest
-/// id). Hints and order of the points are not used. Each round tests some thousand nodes and tetrahedra per point and passes over points that are
-/// finished; [`nearest`] searches for 131,072 points at a time, so that no dispatch takes long.
+/// id). Hints and order of the points are not used.
+///
+/// Each round tests about a thousand nodes and tetrahedra per point and passes over points that are finished; [`nearest`]
+/// searches for 131,072 points at a time, so that no dispatch takes long. Points near the surface take one or two rounds, and
+/// those deep inside, with much of the surface about as far away, many: 38 for points anywhere in a grid of 32×32×32 cubes.
+/// What an unfinished search has found is a place, but need not be the closest, so read [`NearestMemory::unfinished`], or
+/// keep `within` short.
 ///
 /// Entry: mesh, tree and points are read by compute shaders. First use of `memory`: a transfer write of `unfinished`, and
 /// compute reads and writes. Last use: compute reads and writes; no barrier before or after.

@@ -9,8 +9,8 @@
 //! search    searches for those: non-boundary nodes of the other tree, then lists of its boundary leaves (narrow phase)
 //! pairs     counts all pairs that touch, then writes them
 //! ```
-//! [`cmd_overlap`], [`cmd_count_pairs`] and [`cmd_list_pairs`] record these steps; [`overlap`] submits them until
-//! everything is done.
+//! [`cmd_overlap`], [`cmd_count_pairs`] and [`cmd_list_pairs`] record these steps; [`overlap`] and [`overlap_pairs`] submit
+//! them until everything is done.
 
 mod frames;
 mod pairs;
@@ -54,7 +54,17 @@ struct Job<'a> {
     done: Overlapped,
 }
 
-impl Job<'_> {
+impl<'a> Job<'a> {
+    fn run([a, b]: [&'a Tree; 2], report: Progress<'a>, find: fn(&mut Self) -> Result<()>) -> Result<Overlapped> {
+        if !a.gpu().is_same_device(b.gpu()) {
+            return Err(Error::Invalid("the two trees lie on different devices".into()));
+        }
+        let mut job = Self { gpu: a.gpu(), scenes: [a, b].map(Scene::of), report, done: Overlapped::default() };
+        find(&mut job)?;
+        log::debug!("overlap: {}", job.done.times);
+        Ok(job.done)
+    }
+
     fn sets(&mut self) -> Result<()> {
         let (gpu, [a, b], done) = (self.gpu, &self.scenes, &mut self.done);
         let carve = |arena: &mut Arena| OverlapMemory::carve(arena, a, b);
@@ -115,23 +125,21 @@ impl Job<'_> {
     }
 }
 
-/// Overlap of the meshes of two trees, A and B, whose points lie in one space, on one device: all pairs if `pairs` is true, else the two sets
-/// alone. `report` receives how many of the tetrahedra that need a search are done, and how many there are; for pairs,
-/// every tetrahedron of A, twice: its pairs are counted first, then written.
+/// Overlap of the meshes of two trees, A and B, whose points lie in one space, on one device: the tetrahedra of either that
+/// intersect the other. `report` receives how many of the tetrahedra that need a search are done, and how many there are.
 ///
 /// # Errors
-/// [`Error::Memory`], [`Error::TooLarge`] for 2^31 pairs and more, a failed Vulkan call, or [`Error::Invalid`] for
-/// trees on different devices, or pairs in a tree over B without the lists that pairs are found by.
-pub fn overlap(a: &Tree, b: &Tree, pairs: bool, report: Progress<'_>) -> Result<Overlapped> {
-    if !a.gpu().is_same_device(b.gpu()) {
-        return Err(Error::Invalid("the two trees lie on different devices".into()));
-    }
-    let mut job = Job { gpu: a.gpu(), scenes: [a, b].map(Scene::of), report, done: Overlapped::default() };
-    if pairs {
-        job.pairs()?;
-    } else {
-        job.sets()?;
-    }
-    log::debug!("overlap: {}", job.done.times);
-    Ok(job.done)
+/// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] for trees on different devices.
+pub fn overlap(a: &Tree, b: &Tree, report: Progress<'_>) -> Result<Overlapped> {
+    Job::run([a, b], report, Job::sets)
+}
+
+/// As [`overlap`], with all pairs of tetrahedra that intersect. `report` receives every tetrahedron of A, twice: its pairs
+/// are counted first, then written.
+///
+/// # Errors
+/// Those of [`overlap`], [`Error::TooLarge`] for 2^31 pairs and more, and [`Error::Invalid`] for a tree over B without the
+/// lists that pairs are found by ([`crate::options::Lists::All`]).
+pub fn overlap_pairs(a: &Tree, b: &Tree, report: Progress<'_>) -> Result<Overlapped> {
+    Job::run([a, b], report, Job::pairs)
 }

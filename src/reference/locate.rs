@@ -134,7 +134,7 @@ impl<'a> Locator<'a> {
     }
 
     /// Every tetrahedron that contains `p`, ascending; if none does, the owner within the tolerance alone, if there is
-    /// one.
+    /// one. Where tetrahedra overlap, a leaf with a seed tells only those that are connected by faces around the point.
     pub fn owners(&self, p: [f32; 3]) -> Vec<u32> {
         let Some((cell, x)) = place(&self.tree.grid, p) else { return Vec::new() };
         let Some(leaf) = self.tree.find_leaf(cell) else { return Vec::new() };

@@ -4,7 +4,7 @@
 //! The vertices of a tetrahedron are taken in ascending global index, so that two neighbours get bit-identical results
 //! for their common face.
 
-use crate::grid::{per_axis, reciprocal, two_to};
+use crate::grid::{canonical, per_axis, reciprocal, two_to};
 
 /// A point in normalised coordinates.
 pub type Vec3 = [f32; 3];
@@ -135,10 +135,10 @@ impl Sides {
 
 impl Tet {
     /// Barycentric coordinates of `p` in the caller's order of vertices. Every search reports them for an owner,
-    /// however it was found.
+    /// however it was found. A zero has no sign, which Vulkan does not promise to keep.
     pub fn barycentric(&self, p: Vec3) -> [f32; 4] {
         let b = sides_of(self.v, &Bounds::new(self.v), p).barycentric();
-        self.rank.map(|r| b[r])
+        self.rank.map(|r| canonical(b[r]))
     }
 
     /// The tetrahedron `ids` (four different vertices) of a mesh with these normalised points.

@@ -194,7 +194,7 @@ fn check_slices(name: &str, b: &HostAndDevice) -> u64 {
 }
 
 fn check_overlap(name: &str, a: &HostAndDevice, b: &HostAndDevice) -> usize {
-    let expected = query::overlap(&a.tree, &b.tree, false, SILENT).unwrap();
+    let expected = query::overlap(&a.tree, &b.tree, SILENT).unwrap();
     let found = a.lbvh.overlap(&b.lbvh, SILENT).unwrap();
     assert_eq!(expected.overlap.a, found.overlap.a, "{name}: a");
     assert_eq!(expected.overlap.b, found.overlap.b, "{name}: b");

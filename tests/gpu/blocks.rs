@@ -179,7 +179,8 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
             told.borrow_mut().push((done, all));
             Ok(())
         };
-        let whole = query::overlap(x, y, pairs, &report).unwrap().overlap;
+        let find = if pairs { query::overlap_pairs } else { query::overlap };
+        let whole = find(x, y, &report).unwrap().overlap;
         let searched = u64::from(whole.effort[0].searched) + u64::from(whole.effort[1].searched);
         rises(&told, if pairs { 2 * a.tets.len() as u64 } else { searched });
         let memory = 3 << 19;

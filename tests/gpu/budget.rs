@@ -3,11 +3,11 @@
 
 use crate::submit::submit;
 use olbvh::Error;
-use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, Tree, TreeMemory, cmd_build};
+use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, ScenePlan, Tree, TreeMemory, cmd_build};
 use olbvh::gpu::{Arena, BufferRef, Gpu, GpuOptions};
 use olbvh::layout::BuildStatus;
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
-use olbvh::options::{Assign, BuildOptions, Lists};
+use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, OverlapMemory, PointInput, Rounds, SILENT, Scene, cmd_locate, cmd_overlap, locate,
 };
@@ -294,4 +294,32 @@ fn what_does_not_fit_answers_as_empty() {
             assert!(hits.iter().all(|&word| word == 0), "level {level}: {hits:x?}");
         }
     }
+}
+
+/// Of a thin body, too, for which leaves are finer than α asks for.
+#[test]
+fn a_plan_like_a_tree_builds_as_fine_a_tree() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    for (mesh, options) in [
+        (diagonal(), BuildOptions { fineness: Fineness::Pictures, slabs: true, ..BuildOptions::default() }),
+        (kuhn([24, 24, 1]).unwrap(), BuildOptions { fineness: Fineness::Pictures, ..BuildOptions::default() }),
+        (kuhn([6; 3]).unwrap(), BuildOptions { lists: Lists::All, assign: Assign::Aabb, ..BuildOptions::default() }),
+    ] {
+        let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+        let tree = Tree::build(&gpu, &device, &options).unwrap();
+        let like = *tree.status();
+        let [positions, cells] =
+            [gpu.upload("olbvh.test.positions", &mesh.points), gpu.upload("olbvh.test.cells", &mesh.tets)].map(Result::unwrap);
+        for slack in [0.0, 1.5] {
+            let plan = ScenePlan::like(&tree, slack);
+            let bytes = plan.bytes(&gpu).unwrap();
+            let [memory, scratch] = [bytes.memory, bytes.scratch].map(|bytes| gpu.buffer("olbvh.test.memory", bytes).unwrap());
+            let placed = plan.place(&gpu, positions.all(), cells.all(), memory.all(), scratch.all()).unwrap();
+            submit(&gpu, "olbvh.test.like", |r| placed.cmd_build(r)).unwrap();
+            let status: BuildStatus = gpu.download_one(&memory, placed.tree.status).unwrap();
+            let built = |s: &BuildStatus| (s.level, s.entries, s.nodes, s.leaves, s.longest_leaf, s.overflow);
+            assert_eq!(built(&status), built(&like), "{} tetrahedra, slack {slack}", mesh.tets.len());
+        }
+    }
+    crate::silent(&gpu);
 }

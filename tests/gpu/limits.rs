@@ -129,7 +129,7 @@ fn overlap_that_a_late_part_of_a_list_tells() {
     let options = BuildOptions { level: Some(0), lists: Lists::All, ..BuildOptions::default() };
     let [many, one] = [&many, &one].map(|mesh| Tree::build(&gpu, &on_device(&gpu, mesh), &options).unwrap());
     for (a, b) in [(&one, &many), (&many, &one)] {
-        let found = overlap(a, b, false, SILENT).unwrap().overlap;
+        let found = overlap(a, b, SILENT).unwrap().overlap;
         assert_eq!((found.a.len(), found.b.len()), (1, 1));
         assert_eq!(found.effort[0].by_vertex + found.effort[1].by_vertex, 2);
     }

@@ -10,7 +10,8 @@ use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Fineness, LIST_PART, Lists, TOLERANCE};
 use olbvh::query::{
-    LocateMethod, LocateOptions, LocateOutput, PointInput, SILENT, Scene, cmd_locate, locate, locate_all, overlap, render, slice,
+    LocateMethod, LocateOptions, LocateOutput, PointInput, SILENT, Scene, cmd_locate, locate, locate_all, overlap, overlap_pairs, render,
+    slice,
 };
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
@@ -217,9 +218,9 @@ fn overlaps() {
         let trees = [&a, &b].map(|s| Tree::build(&gpu, &s.device, &options(0.0, Assign::Aabb, lists)).unwrap());
         let inputs = [&trees[0], &trees[1]];
         if lists == Lists::Boundary {
-            assert!(overlap(inputs[0], inputs[1], true, SILENT).is_err_and(|e| e.to_string().contains("Lists::All")));
+            assert!(overlap_pairs(inputs[0], inputs[1], SILENT).is_err_and(|e| e.to_string().contains("Lists::All")));
         }
-        let found = overlap(inputs[0], inputs[1], false, SILENT).unwrap().overlap;
+        let found = overlap(inputs[0], inputs[1], SILENT).unwrap().overlap;
         (found.a, found.b)
     });
     assert!(sets[0].0.len() > 100 && sets[0].1.len() > 100);

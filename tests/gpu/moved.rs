@@ -36,6 +36,7 @@ fn what_is_bad_for_a_while_is_left_out_for_as_long() {
         let status: MeshStatus = gpu.download_one(&frame.memory, frame.arrays.status).unwrap();
         assert_eq!(status.bad, topology.counts.bad, "step {step}");
         assert!((status.bad > 0) == (step % 2 == 1), "step {step}");
+        assert_eq!(status.parted > 0, step > 0, "step {step}: it tells although all is whole again");
         boundary.push(status.boundary);
         // What is bad is no neighbour, and has none. Once found, a boundary stays.
         if step < 2 {

@@ -5,7 +5,7 @@ use olbvh::conformance::{HostAndDevice, check_overlap};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::query::{SILENT, overlap};
+use olbvh::query::{SILENT, overlap_pairs};
 
 fn moved(mut mesh: Mesh, at: [f32; 3], scale: f32) -> Mesh {
     mesh.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| at[c] + scale * p[c]));
@@ -51,6 +51,6 @@ fn long_lists_take_several_submissions() {
     let apart = HostAndDevice::new(&gpu, apart, &options).unwrap();
     check_overlap(&apart, &many).unwrap();
     check_overlap(&many, &apart).unwrap();
-    let found = overlap(&apart.tree, &many.tree, true, SILENT).unwrap();
+    let found = overlap_pairs(&apart.tree, &many.tree, SILENT).unwrap();
     assert!(found.times.submissions > 10, "{}", found.times);
 }

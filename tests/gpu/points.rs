@@ -10,7 +10,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::query::{LocateOptions, OwnersMemory, SILENT, locate, locate_all, overlap};
+use olbvh::query::{LocateMethod, LocateOptions, OwnersMemory, SILENT, locate, locate_all, overlap};
 use std::cell::RefCell;
 use std::env;
 
@@ -199,7 +199,7 @@ fn long_lists_are_searched_to_their_end() {
     );
     let other = DeviceMesh::upload(&gpu, &other, BadCells::Skip).unwrap();
     let other = Tree::build(&gpu, &other, &BuildOptions::default()).unwrap();
-    let [a, b] = [&single, &fine].map(|tree| overlap(&other, tree, false, SILENT).unwrap().overlap);
+    let [a, b] = [&single, &fine].map(|tree| overlap(&other, tree, SILENT).unwrap().overlap);
     assert_eq!((a.a, a.b, a.effort[0].by_vertex), (b.a, b.b, b.effort[0].by_vertex));
 }
 
@@ -265,4 +265,45 @@ fn no_point_strictly_inside_a_sliver_is_lost() {
         let lost: Vec<usize> = (0..points.len()).filter(|&i| found.owners[i] != owners[i]).collect();
         assert!(lost.is_empty(), "{lists:?}: {} of {} points are lost, first {:?}", lost.len(), points.len(), points[lost[0]]);
     }
+}
+
+/// A hint must not lead a point that is not finite to an owner, nor may a tolerance decide that is none.
+#[test]
+fn what_is_no_number_has_no_owner() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn([4; 3]).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let inside = [1.3, 2.1, 1.7];
+    let mut points = vec![inside; 32];
+    for (k, nowhere) in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().enumerate() {
+        points[7 * k + 3][k % 3] = nowhere;
+    }
+    for method in [LocateMethod::Descent, LocateMethod::Runs, LocateMethod::Sorted, LocateMethod::SortedRuns] {
+        let found = locate(&tree, &points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT).unwrap();
+        for (i, (point, owner)) in points.iter().zip(&found.owners).enumerate() {
+            assert_eq!(*owner == u32::MAX, !point.iter().all(|x| x.is_finite()), "{method:?}, point {i}");
+        }
+    }
+    for tolerance in [f32::NAN, f32::INFINITY, -1e-5] {
+        let refused = locate(&tree, &points, None, &LocateOptions { tolerance, ..LocateOptions::default() }, SILENT);
+        assert!(refused.is_err_and(|e| e.to_string().contains("a tolerance of")), "{tolerance}");
+        assert!(locate_all(&tree, &points, tolerance, SILENT).is_err(), "{tolerance}");
+    }
+    crate::silent(&gpu);
+}
+
+/// Signs of zeros would differ between devices.
+#[test]
+fn coordinates_of_corners_have_no_sign() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn([3; 3]).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let found = locate(&tree, &mesh.points, None, &LocateOptions::default(), SILENT).unwrap();
+    assert!(
+        found.barycentrics.iter().all(|b| b.iter().all(|w| w.is_sign_positive()) && b.iter().any(|w| *w > 0.9999)),
+        "{:?}",
+        found.barycentrics
+    );
 }

@@ -13,7 +13,7 @@ use olbvh::mesh::{Bounds, Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{
     PairMemory, RenderInput, RenderMemory, Rounds, SILENT, Scene, SliceInput, SliceMemory, cmd_count_pairs, cmd_list_pairs, cmd_render,
-    cmd_slice, overlap, render, slice,
+    cmd_slice, overlap, overlap_pairs, render, slice,
 };
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
@@ -141,7 +141,7 @@ fn frames(gpu: &Gpu) {
         let (sets, pairs) = (reference(a, b, false), reference(a, b, true).pairs.unwrap());
         let hits = |k: usize, n: usize| bits(&read(gpu, &queries, queries.sets.hits[k], n.div_ceil(32)));
         assert_eq!((hits(0, shown.tets.len()), hits(1, other.tets.len())), (sets.a.clone(), sets.b.clone()), "frame {i}");
-        assert_eq!(overlap(&tree, &queries.other_tree, false, SILENT).unwrap().overlap, sets, "frame {i}");
+        assert_eq!(overlap(&tree, &queries.other_tree, SILENT).unwrap().overlap, sets, "frame {i}");
         let statuses = queries.sets.status.map(|part| read::<OverlapStatus>(gpu, &queries, part, 1)[0]);
         assert!(statuses.iter().all(|s| s.unfinished == 0 && s.empty == 0));
 
@@ -226,7 +226,7 @@ fn rounds_go_on_where_they_ended() {
     let few = DeviceMesh::upload(&gpu, &one, BadCells::Skip).unwrap();
     let few_tree = Tree::build(&gpu, &few, &options).unwrap();
     let few_scene = Scene::of(&few_tree);
-    let expected = overlap(&few_tree, &tree, true, SILENT).unwrap();
+    let expected = overlap_pairs(&few_tree, &tree, SILENT).unwrap();
     let expected = expected.overlap.pairs.unwrap();
     let carve = |a: &mut Arena| Ok((PairMemory::carve(&gpu, a, one.tets.len() as u32)?, a.take(8 * expected.len() as u64)?));
     let (buffer, (memory, found)) = Arena::reserve(&gpu, "olbvh.test.pairs", carve).unwrap();

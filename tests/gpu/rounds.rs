@@ -78,8 +78,8 @@ fn calls_can_be_cancelled() {
         ("locate", query::locate(&tree, &mesh.points, None, &how, &enough).map(drop)),
         ("locate_all", query::locate_all(&tree, &mesh.points, 0.0, &enough).map(drop)),
         ("nearest", query::nearest(&tree, &mesh.points, 1.0, &enough).map(drop)),
-        ("overlap", query::overlap(&tree, &tree, false, &enough).map(drop)),
-        ("pairs", query::overlap(&tree, &whole, true, &enough).map(drop)),
+        ("overlap", query::overlap(&tree, &tree, &enough).map(drop)),
+        ("pairs", query::overlap_pairs(&tree, &whole, &enough).map(drop)),
         ("slice", query::slice(&tree, None, &voxels, Extrapolate::Nearest, &enough, &mut |_| Ok(())).map(drop)),
         ("blocks", blocks::locate(&gpu.with_memory(1 << 30), &asked, &how, &enough).map(drop)),
         ("render", {

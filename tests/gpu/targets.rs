@@ -51,7 +51,7 @@ fn ask(gpu: &Gpu, mesh: &Mesh) -> Answers {
         Ok(())
     })
     .unwrap();
-    let overlap = query::overlap(&all, &boundary, false, SILENT).unwrap().overlap;
+    let overlap = query::overlap(&all, &boundary, SILENT).unwrap().overlap;
     Answers {
         trees: [all.download().unwrap(), boundary.download().unwrap()],
         neighbours,

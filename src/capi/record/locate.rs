@@ -52,7 +52,7 @@ pub struct OlbvhLocationParts {
 pub struct OlbvhOwnerParts {
     /// Size of the memory in bytes.
     pub bytes: u64,
-    /// A word per point: the lowest of its owners, as `olbvh_cmd_locate` writes it.
+    /// A word per point: the one of its owners that `olbvh_cmd_locate` writes.
     pub owners: OlbvhBuffer,
     /// Four floats per point: barycentric coordinates in that owner.
     pub barycentrics: OlbvhBuffer,
@@ -177,7 +177,8 @@ pub unsafe extern "C" fn olbvh_owner_parts(
 
 /// Records the search for all owners of points, that is for all tetrahedra that contain each of them: a word each in
 /// `found`, point by point, ascending for each point. Only as many as fit `found` are written; `ends` and `total` of
-/// `olbvh_owner_parts` are correct in any case, modulo 2^32. Of `location`, only points, stride, count and tolerance
+/// `olbvh_owner_parts` are correct in any case, modulo 2^32. Where tetrahedra overlap each other, only a tree with full
+/// lists (`lists` of `olbvh_build_options` 0) finds all of them. Of `location`, only points, stride, count and tolerance
 /// are used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_cmd_owners(
@@ -215,7 +216,8 @@ pub unsafe extern "C" fn olbvh_nearest_parts(count: u32, memory: OlbvhBuffer, ou
 
 /// Records the search for the place of the surface that is closest to each point, as `olbvh_nearest` finds it. Of
 /// `location`, only points, stride and count are used. `unfinished` of `olbvh_nearest_parts` says whether more rounds are
-/// needed, which is rare.
+/// needed; until then, what was found is a place, but need not be the closest. Points near the surface take one or two
+/// rounds, those deep inside many: 38 for points anywhere in a grid of 32 x 32 x 32 cubes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_cmd_nearest(
     recording: *mut OlbvhRecording,

@@ -159,6 +159,8 @@ pub struct OlbvhMeshStatus {
     pub overflow: u32,
     /// Number of faces that more than two tetrahedra share, none of which are neighbours there.
     pub branched: u32,
+    /// Not 0: since `olbvh_cmd_build`, some tetrahedra were bad for a while and have lost their neighbours.
+    pub parted: u32,
 }
 
 impl OlbvhPlan {
@@ -261,7 +263,8 @@ pub unsafe extern "C" fn olbvh_cmd_build(recording: *mut OlbvhRecording, scene: 
 
 /// As `olbvh_cmd_build`, for positions that have changed since a tree of the scene was built: neighbours, whose search
 /// takes much of that time, stay as they were found then. The cells must be the same. A tetrahedron that was or becomes
-/// bad, see `olbvh_mesh_status.bad`, has no neighbours until the next `olbvh_cmd_build`; no point is lost.
+/// bad, see `olbvh_mesh_status.bad`, has no neighbours until the next `olbvh_cmd_build`, and `parted` is not 0 until then: no
+/// point is lost, but the tree is larger, and places inside may count as surface for `olbvh_cmd_nearest`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_cmd_rebuild(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
     border(|| {

@@ -134,7 +134,7 @@ fn statuses_have_the_layout_of_the_device() {
             $(assert_eq!(offset_of!($header, $field), offset_of!($device, $field), stringify!($field));)*
         };
     }
-    same!(OlbvhMeshStatus, MeshStatus: lo hi bad boundary zero_volume negative crowded overflow branched);
+    same!(OlbvhMeshStatus, MeshStatus: lo hi bad boundary zero_volume negative crowded overflow branched parted);
     same!(OlbvhBuildStatus, BuildStatus: level wanted_level candidates entries nodes internal leaves boundary_leaves longest_leaf
         large_levels sum total levels overflow);
     same!(OlbvhNearState, NearState: code entry owner square);

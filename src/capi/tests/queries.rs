@@ -7,7 +7,7 @@ use crate::gpu::Buffer;
 use crate::layout::{NearState, OverlapStatus, RenderStatus, SliceStatus, ViewUniforms, wide};
 use crate::mesh::{Bounds, Field};
 use crate::options::TOLERANCE;
-use crate::query::{LocateOptions, Nearest, SILENT, locate, locate_all, nearest, overlap, render, slice};
+use crate::query::{LocateOptions, Nearest, SILENT, locate, locate_all, nearest, overlap, overlap_pairs, render, slice};
 use crate::render::{PicturePlan, Prepared, ProjectedView, ValidTets};
 use crate::slicing::{Band, Extrapolate};
 use bytemuck::Pod;
@@ -80,7 +80,7 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &PicturePlan, normals: Option<&
     let options = BuildOptions { lists: Lists::All, ..BuildOptions::default() };
     let [tree, other_tree] = [&mesh, &other].map(|m| Tree::build(gpu, m, &options).unwrap());
     let (answers, sliced, _) = sliced(&tree, field, &voxels());
-    let [sets, pairs] = [false, true].map(|pairs| overlap(&tree, &other_tree, pairs, SILENT).unwrap().overlap);
+    let [sets, pairs] = [overlap, overlap_pairs].map(|find| find(&tree, &other_tree, SILENT).unwrap().overlap);
     let bits = |found: &[u32], mesh: &Mesh| {
         let mut words = vec![0; mesh.tets.len().div_ceil(32)];
         found.iter().for_each(|i| words[*i as usize / 32] |= 1 << (i % 32));

@@ -57,7 +57,7 @@ impl PairMemory {
 ///
 /// Entry: meshes and trees are read by compute shaders. First use of `memory`: transfer writes. Last use: compute reads
 /// and writes; no barrier before or after. With [`Rounds::resume`] it continues with the tetrahedra that are not
-/// finished.
+/// finished. A tree over B with [`crate::options::Assign::Aabb`] spares the repeats.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a tree over B without the lists that pairs are found by ([`Lists::All`]), for no rounds, or for
