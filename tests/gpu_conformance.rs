@@ -8,7 +8,7 @@
 //! and validation layers run the quick cases, over a few meshes that together record every kernel. There, compiling
 //! kernels takes longer than all cases, so cases over meshes are divided by what they compute, descriptors leave out
 //! variants that have the same buffers as others; and on SwiftShader, which compiles every kernel anew on every device
-//! that is opened, they are one family, taken by two threads that share a device, with one mesh tested by descriptors. `OLBVH_TEST_GROUP` = `quick`, `full` or
+//! that is opened, they are one family, with one mesh tested by descriptors. `OLBVH_TEST_GROUP` = `quick`, `full` or
 //! `large` overrides this.
 
 mod not_run;
@@ -19,8 +19,6 @@ use olbvh::conformance::{Case, Lab, Outcome, cases, cases_of};
 use olbvh::gpu::{Binding, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use std::env;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
 /// Meshes whose cases take longest; each is a test of its own.
 const LONG: [&str; 5] = ["axle-40", "huge-among-small", "identical-1000", "jitter-12x13x11", "jitter-24x24x24"];
@@ -28,20 +26,6 @@ const LONG: [&str; 5] = ["axle-40", "huge-among-small", "identical-1000", "jitte
 const AT_ONCE: usize = 12;
 /// Meshes that together record every kernel, and also empty dispatches.
 const BRIEF: [&str; 6] = ["no-cells", "one-tet", "bad-cells", "jitter-12x13x11", "one-place", "cloud"];
-
-fn on_swiftshader() -> bool {
-    env::var("OLBVH_TEST_DRIVER").is_ok_and(|driver| driver == "swiftshader")
-}
-
-/// What a case over a mesh computes.
-fn part_of(case: &Case) -> &'static str {
-    match case.name.split('/').next() {
-        Some("locate" | "overlap") => "points",
-        Some("render") => "pictures",
-        Some("slice") => "slices",
-        _ => "trees",
-    }
-}
 
 fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
     let validation = env::var("OLBVH_TEST_VALIDATION").is_ok_and(|v| v == "1");
@@ -68,7 +52,13 @@ fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
         return families;
     }
     let over_meshes: Vec<Case> = families.extract_if(.., |(_, cases)| cases.iter().any(Case::is_over_a_mesh)).flat_map(|f| f.1).collect();
-    let part = |case: &Case| if on_swiftshader() { "meshes" } else { part_of(case) };
+    let part = |case: &Case| match case.name.split('/').next() {
+        _ if driver == "swiftshader" => "meshes",
+        Some("locate" | "overlap") => "points",
+        Some("render") => "pictures",
+        Some("slice") => "slices",
+        _ => "trees",
+    };
     for name in ["trees", "points", "slices", "pictures", "meshes"] {
         let cases: Vec<Case> = over_meshes.iter().filter(|case| part(case) == name).cloned().collect();
         if !cases.is_empty() {
@@ -79,29 +69,7 @@ fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
 }
 
 fn run(binding: Binding, cases: &[Case]) -> Result<(), Failed> {
-    let lab = Lab::new(&GpuOptions { binding: Some(binding), ..Default::default() }).map_err(|e| e.to_string())?;
-    // Two threads share what a slow compiler makes.
-    let threads = if on_swiftshader() { 2 } else { 1 };
-    let runs: Vec<&[Case]> = cases.chunk_by(|a, b| a.family() == b.family() && part_of(a) == part_of(b)).collect();
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let (mut lab, mut failures) = (lab.beside(), Vec::new());
-        while let Some(cases) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
-            failures.extend(failures_of(&mut lab, cases));
-        }
-        failures
-    };
-    let failures: Vec<String> = thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
-        let mut failures = work();
-        failures.extend(others.into_iter().flat_map(|other| other.join().unwrap_or_else(|_| vec!["a thread panicked".into()])));
-        failures
-    });
-    let text = format!("{} of {} cases failed\n{}", failures.len(), cases.len(), failures.join("\n"));
-    if failures.is_empty() { Ok(()) } else { Err(text.into()) }
-}
-
-fn failures_of(lab: &mut Lab, cases: &[Case]) -> Vec<String> {
+    let mut lab = Lab::new(&GpuOptions { binding: Some(binding), ..Default::default() }).map_err(|e| e.to_string())?;
     let mut failures = Vec::new();
     for case in cases {
         let report = lab.run(case);
@@ -115,7 +83,8 @@ fn failures_of(lab: &mut Lab, cases: &[Case]) -> Vec<String> {
             Outcome::Skipped(why) => not_run(&format!("{}: {why}", report.name)),
         }
     }
-    failures
+    let text = format!("{} of {} cases failed\n{}", failures.len(), cases.len(), failures.join("\n"));
+    if failures.is_empty() { Ok(()) } else { Err(text.into()) }
 }
 
 /// Two grids that overlap: a picture of a tree without full lists may differ from that of another tree, and the report
@@ -157,7 +126,7 @@ fn main() {
         }
     }
     // SwiftShader is the one driver whose descriptors start at multiples of 256 bytes.
-    if on_swiftshader() {
+    if env::var("OLBVH_TEST_DRIVER").is_ok_and(|driver| driver == "swiftshader") {
         let cases: Vec<Case> = cases().into_iter().filter(|case| case.matches(Some("quick")) && case.family() == "one-tet").collect();
         trials.push(Trial::test("bindings one-tet", move || run(Binding::Descriptors, &cases)));
     } else {

@@ -47,12 +47,12 @@ void main() {
     leaf_found = NONE;
     uint owner = NONE;
     vec4 b = vec4(0.0);
-    if (near_bounds(g, at)) {
+    vec3 x = normalise(g, at);
+    if (near_bounds(g, at) && in_reach(g, x, tolerance)) {
         point_code = morton(quantize(g, at));
         traverse(g.level);
     }
     if (leaf_found != NONE) {
-        vec3 x = normalise(g, at);
         uvec2 range = entry_range(leaf_found);
         Best best = walked(g, leaf_found, range, at, x);
         uint end = walks_in(leaf_found, range) ? range.x : min(range.y, range.x + MOST_TRAVERSED);

@@ -56,12 +56,6 @@ impl Lab {
         Ok(Self { device, messages: 0, subject: None })
     }
 
-    /// Another lab on the same device, for another thread.
-    #[must_use]
-    pub fn beside(&self) -> Self {
-        Self { device: self.device.clone(), messages: 0, subject: None }
-    }
-
     /// The device, with the target of the options or its own choice.
     pub fn device(&self) -> &Gpu {
         &self.device

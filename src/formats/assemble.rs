@@ -233,7 +233,7 @@ impl Assembly {
     fn origin(lo: [f64; 3], hi: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|c| {
             let extent = hi[c] - lo[c];
-            let far = lo[c].abs().max(hi[c].abs()) > 16.0 * extent && extent > 0.0;
+            let far = lo[c].abs().max(hi[c].abs()) > 16.0 * extent;
             if far { lo[c] } else { 0.0 }
         })
     }

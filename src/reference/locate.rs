@@ -9,7 +9,7 @@ use super::tet::{Tet, Vec3, Weights};
 use super::traverse::{Node, traverse_leaves};
 use super::vertices::Vertices;
 use super::walk::{HINTED, LeafCell, STRIDE, Walked, Walker, weighed};
-use crate::grid::{Grid, MAX_LEVEL, canonical, morton};
+use crate::grid::{Grid, MAX_LEVEL, canonical, morton, two_to};
 use crate::layout::NONE;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{LIST_PART, Lists, POINT_CODE_BITS, POINT_RUN, TOLERANCE};
@@ -87,12 +87,26 @@ impl<'a> Locator<'a> {
         Self { tolerance, ..self }
     }
 
+    /// As [`place`]. `None` also for points farther outside of the bounds than an owner can be: by 3 t times their size, with
+    /// tolerance t, and for what rounding adds. Far outside, rounding could make the weights of a small tetrahedron what they
+    /// please.
+    fn place_in_reach(&self, p: [f32; 3]) -> Option<([u32; 3], Vec3)> {
+        let (cell, x) = place(&self.tree.grid, p)?;
+        let grow = self.tolerance.min(1e10) * 3.0 + two_to(-16);
+        let in_reach = |c: usize| {
+            let extent = self.tree.grid.extent[c];
+            let beyond = extent * grow;
+            x[c] >= -beyond && x[c] <= extent + beyond
+        };
+        (0..3).all(in_reach).then_some((cell, x))
+    }
+
     /// The owner of `p`: of the tetrahedra listed in the point's leaf, the lowest id that contains it. If none does,
     /// the nearest one owns it: preferably one whose box contains the point, then the one with the largest smallest
     /// barycentric coordinate, then the lowest id, but never a flat tetrahedron; in a boundary leaf only if that
     /// coordinate is at least −tolerance. In a leaf without list (SPEC 2.6) a walk finds the same owner.
     pub fn locate(&self, p: [f32; 3]) -> Location {
-        let Some((cell, x)) = place(&self.tree.grid, p) else { return Location::NOWHERE };
+        let Some((cell, x)) = self.place_in_reach(p) else { return Location::NOWHERE };
         self.tree.find_leaf(cell).map_or(Location::NOWHERE, |leaf| self.in_leaf(leaf, cell, x))
     }
 
@@ -136,7 +150,7 @@ impl<'a> Locator<'a> {
     /// Every tetrahedron that contains `p`, ascending; if none does, the owner within the tolerance alone, if there is
     /// one. Where tetrahedra overlap, a leaf with a seed tells only those that are connected by faces around the point.
     pub fn owners(&self, p: [f32; 3]) -> Vec<u32> {
-        let Some((cell, x)) = place(&self.tree.grid, p) else { return Vec::new() };
+        let Some((cell, x)) = self.place_in_reach(p) else { return Vec::new() };
         let Some(leaf) = self.tree.find_leaf(cell) else { return Vec::new() };
         let mut owners = Vec::new();
         if self.tree.seed(leaf).is_some() {
@@ -155,7 +169,7 @@ impl<'a> Locator<'a> {
     /// As [`Locator::locate`], but finds the leaf by the paper's traversal with a stack of `stack` nodes instead of the
     /// descent.
     pub fn locate_by_traversal(&self, p: [f32; 3], stack: usize) -> Location {
-        let Some((cell, x)) = place(&self.tree.grid, p) else { return Location::NOWHERE };
+        let Some((cell, x)) = self.place_in_reach(p) else { return Location::NOWHERE };
         let code = morton(cell);
         let holds = |node: Node| node.code == code >> (3 * (MAX_LEVEL - node.level));
         let mut location = Location::NOWHERE;

@@ -132,6 +132,20 @@ fn far_meshes_keep_their_shape() {
     }
 }
 
+/// A flat body that stands far away is moved as well: the next number to 1e9 is 64 away.
+#[test]
+fn a_flat_axis_is_moved_to_the_origin() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, bytes) = all().swap_remove(4);
+    let text = String::from_utf8(bytes).unwrap();
+    let (head, cells) = (text.find("POINTS").unwrap(), text.find("CELLS").unwrap());
+    let points: String = POINTS.iter().map(|p| format!("{} {} 1000000003\n", p[0], p[1])).collect();
+    let flat = format!("{}POINTS 8 double\n{points}{}", &text[..head], &text[cells..]);
+    let Loaded { mesh, .. } = open(write(&folder, "flat.vtk", flat.as_bytes()));
+    assert_eq!(mesh.origin, [0.0, 0.0, 1_000_000_003.0]);
+    assert!(mesh.points.iter().all(|p| p[2] == 0.0));
+}
+
 #[test]
 fn kuhn_grids() {
     let plain = load("kuhn:3,4,5", &LoadOptions::default()).unwrap();

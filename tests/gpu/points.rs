@@ -11,6 +11,9 @@ use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::query::{LocateMethod, LocateOptions, OwnersMemory, SILENT, locate, locate_all, overlap};
+use olbvh::reference::boundary::topology;
+use olbvh::reference::build::build;
+use olbvh::reference::locate::Locator;
 use std::cell::RefCell;
 use std::env;
 
@@ -306,4 +309,35 @@ fn coordinates_of_corners_have_no_sign() {
         "{:?}",
         found.barycentrics
     );
+}
+
+/// Points so far from two small tetrahedra that rounding leaves nothing of their weights. Some of them once had owners.
+#[test]
+fn far_outside_there_are_no_owners() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let far = 100_000.0;
+    let corners = [[6.0, 6.0, 1.0], [6.0, 9.0, 2.0], [0.0, 0.0, 4.0], [4.0, 2.0, 0.0]];
+    let others = [[far; 3], [far - 9.0, far, far], [far, far - 9.0, far], [far, far, far - 9.0]];
+    let mesh = Mesh::new([corners, others].concat(), vec![[0, 1, 2, 3], [4, 5, 6, 7]]);
+    let mut points = vec![[-41_235.0, -40_316.0, -10_397.0], [-35_765.0, -28_373.0, -54_901.0], [-34_276.0, -50_925.0, -29_764.0]];
+    points.extend((0..20_000u32).map(|i| [0, 1, 2].map(|k| -60_000.0 + (mix(3 * i + k) >> 8) as f32 * (59_000.0 / 16_777_216.0))));
+    // Just outside of the bounds, within the tolerance.
+    points.push([far + 2e-5, far - 1.0, far - 1.0]);
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    for (lists, level, tolerance) in [(Lists::Boundary, None, 1e-5), (Lists::All, Some(0), 0.0), (Lists::Boundary, Some(10), 1e-2)] {
+        let options = BuildOptions { lists, level, ..BuildOptions::default() };
+        let tree = Tree::build(&gpu, &device, &options).unwrap();
+        for method in [LocateMethod::Descent, LocateMethod::Traversal(8)] {
+            let found = locate(&tree, &points, None, &LocateOptions { method, tolerance }, SILENT).unwrap();
+            let owned = found.owners[..points.len() - 1].iter().filter(|&&owner| owner != u32::MAX).count();
+            assert_eq!(owned, 0, "{method:?}, {lists:?}, level {level:?}");
+        }
+        let topology = topology(&mesh).unwrap();
+        let arrays = build(&mesh, &topology, &options).unwrap();
+        let locator = Locator::new(&mesh, &topology, &arrays).with_tolerance(tolerance);
+        assert!(points[..points.len() - 1].iter().all(|&p| locator.locate(p).found().is_none() && locator.owners(p).is_empty()));
+        let all = locate_all(&tree, &points, tolerance, SILENT).unwrap();
+        assert_eq!(all.owners.iter().flatten().count(), locator.owners(points[points.len() - 1]).len());
+    }
+    crate::silent(&gpu);
 }

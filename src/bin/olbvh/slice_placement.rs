@@ -1,6 +1,6 @@
 //! Where the voxels of `olbvh slice` lie, in the coordinates of the mesh file.
 
-use crate::text::{joined, number};
+use crate::text::{joined, number, told_apart};
 use olbvh::mesh::{Bounds, Mesh};
 use olbvh::slicing::VoxelGrid;
 
@@ -61,7 +61,8 @@ impl Placement {
     /// there is none.
     pub fn remark_on_emptiness(&self, axis: Option<&str>, bounds: &Bounds, mesh: &Mesh) -> String {
         let along = axis.map_or_else(|| format!("({})", joined(&self.axes[2].map(number), ", ")), str::to_owned);
-        let ([mesh_lo, mesh_hi], [lo, hi]) = (self.mesh_span(bounds, mesh).map(number), self.layers_span().map(number));
+        let ([mesh_lo, mesh_hi], [lo, hi]) = (self.mesh_span(bounds, mesh), self.layers_span());
+        let [mesh_lo, mesh_hi, lo, hi] = told_apart([mesh_lo, mesh_hi, lo, hi]);
         format!("all voxels are empty: along {along} the mesh lies from {mesh_lo} to {mesh_hi}, the layers from {lo} to {hi}")
     }
 }

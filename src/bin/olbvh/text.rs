@@ -70,6 +70,17 @@ pub fn number(x: f64) -> f64 {
     format!("{x:.7e}").parse().unwrap_or(x)
 }
 
+/// Rounds as [`number`] does, or to as many more digits as it takes for different numbers to stay different.
+pub fn told_apart<const N: usize>(of: [f64; N]) -> [f64; N] {
+    let distinct = |of: &[f64; N]| {
+        let mut sorted = *of;
+        sorted.sort_by(f64::total_cmp);
+        sorted.windows(2).filter(|pair| pair[0] < pair[1]).count()
+    };
+    let rounded = |digits: usize| of.map(|x| format!("{x:.digits$e}").parse().unwrap_or(x));
+    (7..16).map(rounded).find(|rounded| distinct(rounded) == distinct(&of)).unwrap_or(of)
+}
+
 /// The number with the fewest digits that is `x` in single precision: 0.4 rather than 0.4000000059604645.
 pub fn single(x: f32) -> f64 {
     format!("{x:e}").parse().unwrap_or(x.into())
@@ -106,6 +117,12 @@ pub fn joined<T: std::fmt::Display>(values: &[T], separator: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn different_numbers_stay_different() {
+        assert_eq!(told_apart([0.1f32.into(), 1e9, 1e9, 3.0]), [0.1, 1e9, 1e9, 3.0]);
+        assert_eq!(told_apart([1e9, 1e9 + 0.001, 1e9 + 29.5]), [1e9, 1_000_000_000.001, 1_000_000_029.5]);
+    }
 
     #[test]
     fn a_long_label_moves_its_own_value_only() {
