@@ -12,19 +12,19 @@ RECORDS(0, uvec4, cells)
 BUFFER(1, readonly, float, field)
 BUFFER(2, readonly, uint, owners)
 BUFFER16(3, readonly, vec4, barycentrics)
-BUFFER(4, writeonly, float, values)
+BUFFER(4, writeonly, uint, values) // floats, by their bits: compilers may take it that no float is NaN
 
 void main() {
     uint i = item_index();
     if (i >= count) return;
     uint owner = owners.at[i];
-    float value = uintBitsToFloat(0x7fc00000u);
+    uint value = 0x7fc00000u; // NaN
     if (owner != NONE && ON_CELLS != 0u) {
-        value = field.at[owner];
+        value = floatBitsToUint(field.at[owner]);
     } else if (owner != NONE) {
         uvec4 ids = words(cells.at[owner]);
         vec4 b = barycentrics.at[i];
-        value = weighed(b, vec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]));
+        value = floatBitsToUint(weighed(b, vec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w])));
     }
     values.at[i] = value;
 }

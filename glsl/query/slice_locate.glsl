@@ -32,7 +32,7 @@ BUFFER(5, READ_WRITE, RunState, states)
 BUFFER(6, writeonly, uint, answers) // owner, or SLICE_PENDING
 BUFFER(7, READ_WRITE, SliceStatus, status) // zeroed
 BUFFER(8, readonly, float, field)
-BUFFER(9, writeonly, float, values)
+BUFFER(9, writeonly, uint, values) // floats, by their bits: compilers may take it that no float is NaN
 STRUCTURE(10)
 #include "shared/structure_owner.glsl"
 #include "shared/held.glsl"
@@ -66,8 +66,8 @@ bool go_on(Sides sides) {
     return true;
 }
 
-// Writes the answer for the next voxel of the run.
-void settle(uint answer, float value) {
+// Writes the answer for the next voxel of the run, and the bits of its value.
+void settle(uint answer, uint value) {
     uint voxel = line + state.next * plan.width;
     answers.at[voxel] = answer;
     if (FIELD != 0u && answer != SLICE_PENDING) values.at[voxel] = value;
@@ -79,14 +79,14 @@ void settle(uint answer, float value) {
 // Marks the next voxel as one whose box must be tested.
 void wait() {
     ++state.waiting;
-    settle(SLICE_PENDING, 0.0);
+    settle(SLICE_PENDING, 0u);
 }
 
 // Settles the next voxel, whose centre lies in the stand.
 void settle_inside(Sides sides) {
     state.hint = stand.t;
     ++state.inside;
-    settle(stand.t, FIELD == 0u ? 0.0 : value_of(held, barycentric(sides)));
+    settle(stand.t, FIELD == 0u ? 0u : floatBitsToUint(value_of(held, barycentric(sides))));
 }
 
 #ifndef BINARY_TREE
@@ -154,7 +154,7 @@ void main() {
         column = i % plan.width;
         line = lines.x * plan.width + column;
         row = voxel_row(plan, lines.x + state.next);
-        while (plan.refused != 0u && state.next < count) settle(NONE, uintBitsToFloat(NAN));
+        while (plan.refused != 0u && state.next < count) settle(NONE, NAN);
         bool stands = state.hint != NONE && state.cursor == 0u;
         leave();
         if (stands) enter(state.hint);
@@ -194,7 +194,7 @@ void main() {
                 uint leap = min(LEAP, min(count - state.next, plan.height - row.x));
                 vec3 last = voxel_centre(plan, row_origin(plan, uvec2(row.x + leap - 1u, row.y)), column);
                 if (!is_ours(g, last) || !is_still_empty(g, last)) leap = 1u;
-                for (uint k = 0u; k < leap; ++k) settle(NONE, uintBitsToFloat(NAN));
+                for (uint k = 0u; k < leap; ++k) settle(NONE, NAN);
                 continue;
             }
             leave();
@@ -213,7 +213,7 @@ void main() {
                 settle_inside(sides_of(stand, x));
             } else {
                 state.hint = NONE;
-                if (is_empty(g, at, x)) settle(NONE, uintBitsToFloat(NAN));
+                if (is_empty(g, at, x)) settle(NONE, NAN);
                 else wait();
             }
         }

@@ -20,7 +20,7 @@ BUFFER(3, readonly, float, field)
 BUFFER16(4, readonly, SliceUniforms, plans)
 BUFFER(5, readonly, TouchState, states)
 BUFFER(6, readonly, uint, answers)
-BUFFER(7, writeonly, float, values)
+BUFFER(7, writeonly, uint, values) // floats, by their bits
 BUFFER(8, READ_WRITE, SliceStatus, status)
 #include "shared/vertices.glsl"
 
@@ -46,8 +46,8 @@ void main() {
         uint voxel = states.at[i].voxel, answer = answers.at[voxel];
         touched = uint(answer != NONE);
         if (FIELD != 0u) {
-            float value = uintBitsToFloat(NAN);
-            if (answer != NONE) value = touched_value(answer & ~SLICE_TOUCHED, normalise(grid.at[0], voxel_centre(plan, voxel)));
+            uint value = NAN;
+            if (answer != NONE) value = floatBitsToUint(touched_value(answer & ~SLICE_TOUCHED, normalise(grid.at[0], voxel_centre(plan, voxel))));
             values.at[voxel] = value;
         }
     }
