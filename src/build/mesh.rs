@@ -102,7 +102,7 @@ impl DeviceMesh {
         let grid: Grid = gpu.download_one(&memory, arrays.grid)?;
         if status.overflow != 0 {
             return Err(Error::TooLarge(format!(
-                "the table of faces is full: too few of the {n_tets} tetrahedra share faces; they can be taken in blocks, see `blocks`"
+                "the table of faces is full: too few of the {n_tets} tetrahedra share faces; they can be taken in blocks (`olbvh::blocks`)"
             )));
         }
         let memory = Arc::new(MeshMemory { _positions: positions, _cells: cells, arrays: memory });

@@ -140,7 +140,7 @@ pub(crate) fn summing_tile(tets: u32, workgroup: u32) -> u32 {
 pub(crate) fn check_tets(tets: u32) -> Result<()> {
     if tets > MAX_TETS {
         return Err(Error::TooLarge(format!(
-            "{tets} tetrahedra; one mesh holds {MAX_TETS} at most; more are taken in blocks, see `blocks`"
+            "{tets} tetrahedra; one mesh holds {MAX_TETS} at most; more are taken in blocks (`olbvh::blocks`)"
         )));
     }
     Ok(())

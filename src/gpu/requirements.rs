@@ -120,6 +120,8 @@ struct Offer {
     driver: vk::DriverId,
     invocations: u32,
     shared_bytes: u32,
+    /// Of a subgroup; 0 where the instance is too old to be told.
+    lanes: u32,
     /// Subgroup operations supported in compute shaders.
     subgroup: vk::SubgroupFeatureFlags,
     compute_queue: bool,
@@ -148,10 +150,11 @@ fn missing(offer: &Offer) -> Vec<String> {
         (vk::SubgroupFeatureFlags::ARITHMETIC, "arithmetic"),
         (vk::SubgroupFeatureFlags::BALLOT, "ballot"),
     ];
-    for (flag, name) in operations {
-        if !offer.subgroup.contains(flag) {
-            missing.push(format!("subgroup {name} operations in compute"));
-        }
+    if offer.lanes == 0 {
+        missing.push("an instance whose ApplicationInfo asks for Vulkan 1.2 or later: others are not told of subgroups".into());
+    } else {
+        let lacking = operations.into_iter().filter(|&(flag, _)| !offer.subgroup.contains(flag));
+        missing.extend(lacking.map(|(_, name)| format!("subgroup {name} operations in compute")));
     }
     if !offer.compute_queue {
         missing.push("a compute queue".into());
@@ -223,6 +226,7 @@ impl Requirements {
             driver: driver.driver_id,
             invocations: properties.limits.max_compute_work_group_invocations,
             shared_bytes: properties.limits.max_compute_shared_memory_size,
+            lanes: subgroup.subgroup_size,
             subgroup: if in_compute { subgroup.supported_operations } else { vk::SubgroupFeatureFlags::empty() },
             compute_queue: queue_family.is_some(),
         });
@@ -405,6 +409,7 @@ mod tests {
             driver: vk::DriverId::default(),
             invocations: 256,
             shared_bytes: 16384,
+            lanes: 32,
             subgroup: vk::SubgroupFeatureFlags::BASIC
                 | vk::SubgroupFeatureFlags::VOTE
                 | vk::SubgroupFeatureFlags::ARITHMETIC
@@ -420,6 +425,8 @@ mod tests {
         assert_eq!(missing(&Offer { driver: vk::DriverId::MOLTENVK, ..least() }), ["MoltenVK 1.3"]);
         assert!(missing(&Offer { driver: vk::DriverId::MOLTENVK, api: vk::API_VERSION_1_3, ..least() }).is_empty());
         let subgroup = vk::SubgroupFeatureFlags::empty();
+        let untold = missing(&Offer { lanes: 0, subgroup, ..least() });
+        assert!(untold.len() == 1 && untold[0].contains("ApplicationInfo"), "{untold:?}");
         let nothing = Offer { api: 0, invocations: 0, shared_bytes: 0, subgroup, compute_queue: false, ..least() };
         assert_eq!(missing(&nothing).len(), 8);
     }

@@ -246,6 +246,26 @@ fn rounds_go_on_where_they_ended() {
         submit(&gpu, "olbvh.test.rounds", |r| cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::resume(2))).unwrap();
     }
     assert_eq!(gpu.download::<[u32; 2]>(&buffer, found.part(0, 8 * expected.len() as u64)).unwrap(), expected);
+
+    // Where there is room for some pairs only, the others are not written behind it.
+    let untouched = [0x5555_5555; 2];
+    let guarded = gpu.upload("olbvh.test.guarded", &vec![untouched; expected.len()]).unwrap();
+    let room = expected.len() / 3;
+    let some = guarded.all().part(0, 8 * room as u64);
+    let count = |rounds| submit(&gpu, "olbvh.test.rounds", |r| cmd_count_pairs(r, &few_scene, &scene, &memory, rounds)).unwrap();
+    let list = |rounds| submit(&gpu, "olbvh.test.rounds", |r| cmd_list_pairs(r, &few_scene, &scene, &memory, some, rounds)).unwrap();
+    count(Rounds::begin(2));
+    while status().unfinished > 0 {
+        count(Rounds::resume(2));
+    }
+    list(Rounds::begin(2));
+    while status().unfilled > 0 {
+        list(Rounds::resume(2));
+    }
+    let written: Vec<[u32; 2]> = gpu.download(&guarded, guarded.all()).unwrap();
+    assert_eq!(written[..room], expected[..room]);
+    assert!(room > 1 && written[room..].iter().all(|&pair| pair == untouched));
+    assert_eq!(status().pairs, [expected.len() as u32, 0], "how many there are is told nevertheless");
 }
 
 /// A picture drawn in several recordings equals that of one recording: of a volume, or of a surface across it.

@@ -5,7 +5,7 @@ use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds};
 use crate::build::{cmd_ranges, range_bytes};
 use crate::capi::query::OlbvhPictureSettings;
 use crate::capi::{OlbvhStatus, border, handle, place};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Arena;
 use crate::layout::ViewUniforms;
 use crate::mesh::Bounds;
@@ -170,7 +170,11 @@ pub unsafe extern "C" fn olbvh_view_make_projected(
 /// See [`crate::capi`].
 unsafe fn bounds(lo: *const f32, hi: *const f32) -> Result<Bounds> {
     // SAFETY: the caller keeps the rules of `capi`.
-    unsafe { Ok(Bounds { lo: *handle(lo.cast(), "lo")?, hi: *handle(hi.cast(), "hi")? }) }
+    let Bounds { lo, hi } = unsafe { Bounds { lo: *handle(lo.cast(), "lo")?, hi: *handle(hi.cast(), "hi")? } };
+    if lo.iter().zip(&hi).all(|(lo, hi)| lo.is_finite() && hi.is_finite() && lo <= hi) {
+        return Ok(Bounds { lo, hi });
+    }
+    Err(Error::Invalid(format!("a box from {lo:?} to {hi:?}; coordinates are finite, and those of lo at most those of hi")))
 }
 
 fn view_of(plan: &PicturePlan) -> OlbvhView {

@@ -157,6 +157,10 @@ fn projected(settings: &OlbvhPictureSettings) {
     let flat = [0.0; 16];
     let made = call!(olbvh_view_make_projected(settings, LO.as_ptr(), HI.as_ptr(), flat.as_ptr(), 0, none.as_mut_ptr()));
     assert!(made == OlbvhStatus::Invalid && message().contains("without an inverse"), "{}", message());
+    for lo in [[LO[0], HI[1] + 1.0, LO[2]], [f32::NAN, LO[1], LO[2]]] {
+        let made = call!(olbvh_view_make(settings, lo.as_ptr(), HI.as_ptr(), none.as_mut_ptr()));
+        assert!(made == OlbvhStatus::Invalid && message().contains("a box from"), "{}", message());
+    }
 }
 
 /// Records all queries in one command buffer, after a rehearsal, twice.

@@ -90,7 +90,7 @@ pub fn cmd_count_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &Pair
 /// B, ascending by A, and for one tetrahedron of A in the order of B's leaves. As many are written as `found` holds;
 /// `pairs` of the status says how many there are. If 32 bits cannot number them, none is written. Complete once
 /// [`crate::layout::OverlapStatus::unfilled`] is 0; with [`Rounds::resume`] it continues with the tetrahedra that are
-/// not finished.
+/// not finished. A list is written once: for another one, count again.
 ///
 /// Starts with a barrier (with [`Rounds::resume`]: with a transfer write of the status). Last use: compute reads and
 /// writes; no barrier after.
