@@ -721,17 +721,17 @@ void olbvh_search(inout olbvh_Best best, uint begin, uint end, olbvh_Sought s) {
     }
 }
 
-// Whether x is no farther outside of the bounds than an owner can be: by 3 t times their size, and for what rounding adds.
-// Far outside, rounding could make the weights of a small tetrahedron what they please.
-bool olbvh_in_reach(olbvh_Grid g, vec3 x, float tolerance) {
+// Whether a point, x in normalised coordinates, is no farther outside of the bounds than it can be from its owner: by 3 t
+// times their size, and what rounding adds. Farther away, the weights of a small tetrahedron are nothing but rounding.
+bool olbvh_in_reach(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
     precise float grow = min(tolerance, 1e10) * 3.0 + olbvh_two_to(-16);
     precise vec3 beyond = g.extent.xyz * grow, most = g.extent.xyz + beyond;
-    return all(greaterThanEqual(x, -beyond)) && all(lessThanEqual(x, most));
+    return olbvh_near_bounds(g, at) && all(greaterThanEqual(x, -beyond)) && all(lessThanEqual(x, most));
 }
 
 // The leaf whose tetrahedra may own the point `at`, x in normalised coordinates; NONE if none can.
 uint olbvh_leaf_to_search(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
-    if (!olbvh_near_bounds(g, at) || !olbvh_in_reach(g, x, tolerance)) return olbvh_NONE;
+    if (!olbvh_in_reach(g, at, x, tolerance)) return olbvh_NONE;
     uvec3 finest = olbvh_quantize(g, at);
     uint leaf = olbvh_find_leaf(g.level, finest);
     return leaf == olbvh_NONE || (olbvh_leaves_room(g, tolerance) && olbvh_side_of_slab(g, olbvh_slab_scale(g), leaf, finest, x) != 0) ? olbvh_NONE : leaf;

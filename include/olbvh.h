@@ -1215,8 +1215,8 @@ enum olbvh_status olbvh_locate(const struct olbvh_tree *tree,
  Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), inside or outside:
  the tetrahedron with it, or `OLBVH_NONE` if none is at most `within` away, a length like the coordinates. However large
  `within` is, places farther away than some limit, which lies between half of the mesh's largest extent and all of it,
- are not found. `barycentrics` gets four floats per point, in the order of
- the tetrahedron's vertices, and `distances` one, NaN without a place; each of these two may be null.
+ are not found. `barycentrics` gets four floats per point, in the order of the tetrahedron's vertices, and `distances`
+ one, NaN without a place; each of these two may be null.
  */
 enum olbvh_status olbvh_nearest(const struct olbvh_tree *tree,
                                 const float *points,
@@ -1415,8 +1415,8 @@ enum olbvh_status olbvh_nearest_parts(uint32_t count,
 /*
  Records the search for the place of the surface that is closest to each point, as `olbvh_nearest` finds it. Of
  `location`, only points, stride and count are used. `unfinished` of `olbvh_nearest_parts` says whether more rounds are
- needed; until then, what was found is a place, but need not be the closest. Points near the surface take one or two
- rounds, those deep inside many: 38 for points anywhere in a grid of 32 x 32 x 32 cubes.
+ needed; until then, a point has no coordinates yet, and its tetrahedron need not be the closest. Points deep inside take
+ many rounds: in a grid of 32 x 32 x 32 cubes, 27 for points anywhere, 54 around its middle.
  */
 enum olbvh_status olbvh_cmd_nearest(struct olbvh_recording *recording,
                                     const struct olbvh_scene *scene,

@@ -35,8 +35,8 @@ fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
         return grouped(&group, |_| true);
     }
     let group = if reference { "full" } else { "quick" };
-    // Every row of the table of targets compiles all kernels anew, as tests/gpu/targets.rs does, but
-    // not for every subgroup size of lavapipe.
+    // Every row of the table of targets compiles all kernels anew. tests/gpu/targets.rs has them too, but not for every
+    // subgroup size of lavapipe.
     let in_shape = |case: &Case| (binding == Binding::Address && driver.starts_with("lavapipe25-")) || !case.name.contains("/row-");
     // Surfaces are drawn from the same buffers as volumes.
     let same = |case: &Case| binding == Binding::Descriptors && case.name.contains("/surfaces");

@@ -48,7 +48,7 @@ void main() {
     uint owner = NONE;
     vec4 b = vec4(0.0);
     vec3 x = normalise(g, at);
-    if (near_bounds(g, at) && in_reach(g, x, tolerance)) {
+    if (in_reach(g, at, x, tolerance)) {
         point_code = morton(quantize(g, at));
         traverse(g.level);
     }

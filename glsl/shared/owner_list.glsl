@@ -36,17 +36,17 @@ void search(inout Best best, uint begin, uint end, Sought s) {
     }
 }
 
-// Whether x is no farther outside of the bounds than an owner can be: by 3 t times their size, and for what rounding adds.
-// Far outside, rounding could make the weights of a small tetrahedron what they please.
-bool in_reach(Grid g, vec3 x, float tolerance) {
+// Whether a point, x in normalised coordinates, is no farther outside of the bounds than it can be from its owner: by 3 t
+// times their size, and what rounding adds. Farther away, the weights of a small tetrahedron are nothing but rounding.
+bool in_reach(Grid g, vec3 at, vec3 x, float tolerance) {
     precise float grow = min(tolerance, 1e10) * 3.0 + two_to(-16);
     precise vec3 beyond = g.extent.xyz * grow, most = g.extent.xyz + beyond;
-    return all(greaterThanEqual(x, -beyond)) && all(lessThanEqual(x, most));
+    return near_bounds(g, at) && all(greaterThanEqual(x, -beyond)) && all(lessThanEqual(x, most));
 }
 
 // The leaf whose tetrahedra may own the point `at`, x in normalised coordinates; NONE if none can.
 uint leaf_to_search(Grid g, vec3 at, vec3 x, float tolerance) {
-    if (!near_bounds(g, at) || !in_reach(g, x, tolerance)) return NONE;
+    if (!in_reach(g, at, x, tolerance)) return NONE;
     uvec3 finest = quantize(g, at);
     uint leaf = find_leaf(g.level, finest);
     return leaf == NONE || (leaves_room(g, tolerance) && side_of_slab(g, slab_scale(g), leaf, finest, x) != 0) ? NONE : leaf;

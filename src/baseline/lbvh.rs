@@ -8,7 +8,9 @@ use crate::layout::{Grid, LbvhNode};
 use crate::mesh::On;
 use crate::primitives::{Count, SortScratch, cmd_fill, cmd_sort_pairs};
 use crate::query::searched::{BinaryTree, Searched, Structure};
-use crate::query::{LocateOutput, Located, PointInput, Progress, Rendered, Rounds, Sliced, numbered, render_in, slice_in, until_done};
+use crate::query::{
+    LocateOutput, Located, PointInput, Progress, Rendered, Rounds, Sliced, check_tolerance, numbered, render_in, slice_in, until_done,
+};
 use crate::render::PicturePlan;
 use crate::slicing::{Band, Extrapolate, VoxelGrid};
 use crate::times::StageTimes;
@@ -111,8 +113,8 @@ pub fn cmd_build_lbvh(r: &mut Recorder<'_>, mesh: &MeshView, tree: &BinaryTree, 
 /// there is none at the end.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for no rounds or for parts of fewer points, [`crate::Error::TooLarge`] for points of more
-/// than 2^31 floats, [`crate::Error::Vulkan`] if the pipeline cannot be made.
+/// [`crate::Error::Invalid`] for no rounds, parts of fewer points or a tolerance out of its range, [`crate::Error::TooLarge`]
+/// for points of more than 2^31 floats, [`crate::Error::Vulkan`] if the pipeline cannot be made.
 pub fn cmd_locate_lbvh(
     r: &mut Recorder<'_>,
     (mesh, tree): (&MeshView, &BinaryTree),
@@ -123,6 +125,7 @@ pub fn cmd_locate_lbvh(
     rounds: Rounds,
 ) -> Result<()> {
     rounds.check()?;
+    check_tolerance(tolerance)?;
     PointInput { points, stride: 3, count, hints: None, order: None }.check()?;
     output.check(count)?;
     unfinished.check(4, "the word of unfinished points")?;

@@ -220,8 +220,8 @@ pub unsafe extern "C" fn olbvh_locate(
 /// Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), inside or outside:
 /// the tetrahedron with it, or `OLBVH_NONE` if none is at most `within` away, a length like the coordinates. However large
 /// `within` is, places farther away than some limit, which lies between half of the mesh's largest extent and all of it,
-/// are not found. `barycentrics` gets four floats per point, in the order of
-/// the tetrahedron's vertices, and `distances` one, NaN without a place; each of these two may be null.
+/// are not found. `barycentrics` gets four floats per point, in the order of the tetrahedron's vertices, and `distances`
+/// one, NaN without a place; each of these two may be null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_nearest(
     tree: *const OlbvhTree,

@@ -150,7 +150,7 @@ fn missing(offer: &Offer) -> Vec<String> {
         (vk::SubgroupFeatureFlags::ARITHMETIC, "arithmetic"),
         (vk::SubgroupFeatureFlags::BALLOT, "ballot"),
     ];
-    if offer.lanes == 0 {
+    if offer.lanes == 0 && (major, minor) >= (1, 1) {
         missing.push("an instance whose ApplicationInfo asks for Vulkan 1.2 or later: others are not told of subgroups".into());
     } else {
         let lacking = operations.into_iter().filter(|&(flag, _)| !offer.subgroup.contains(flag));

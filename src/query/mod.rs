@@ -12,8 +12,8 @@ mod visible;
 mod volume;
 
 pub use all_owners::{AllOwners, OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
-pub(crate) use locate::numbered;
 pub use locate::{LocateMethod, LocateOptions, LocateOutput, Located, MOST_TRAVERSED, PointInput, cmd_interpolate, cmd_locate, locate};
+pub(crate) use locate::{check_tolerance, numbered};
 pub(crate) use nearest::nearest_in;
 pub use nearest::{Nearest, NearestMemory, cmd_nearest, nearest};
 pub(crate) use order::code_bits;

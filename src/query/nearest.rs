@@ -42,10 +42,10 @@ impl NearestMemory {
 /// id). Hints and order of the points are not used.
 ///
 /// Each round tests about a thousand nodes and tetrahedra per point and passes over points that are finished; [`nearest`]
-/// searches for 131,072 points at a time, so that no dispatch takes long. Points near the surface take one or two rounds, and
-/// those deep inside, with much of the surface about as far away, many: 38 for points anywhere in a grid of 32×32×32 cubes.
-/// What an unfinished search has found is a place, but need not be the closest, so read [`NearestMemory::unfinished`], or
-/// keep `within` short.
+/// searches for 131,072 points at a time, so that no dispatch takes long. Points close to the surface take one or two rounds,
+/// and those deep inside, with much of the surface about as far away, many: in a grid of 32×32×32 cubes, 27 for 2,000 points
+/// anywhere, and 54 around its middle. A search that is not finished has no coordinates yet, and its tetrahedron need not be
+/// the closest, so read [`NearestMemory::unfinished`], or keep `within` short.
 ///
 /// Entry: mesh, tree and points are read by compute shaders. First use of `memory`: a transfer write of `unfinished`, and
 /// compute reads and writes. Last use: compute reads and writes; no barrier before or after.

@@ -87,9 +87,9 @@ impl<'a> Locator<'a> {
         Self { tolerance, ..self }
     }
 
-    /// As [`place`]. `None` also for points farther outside of the bounds than an owner can be: by 3 t times their size, with
-    /// tolerance t, and for what rounding adds. Far outside, rounding could make the weights of a small tetrahedron what they
-    /// please.
+    /// As [`place`]. `None` also for a point that is farther outside of the bounds than it can be from its owner: by 3 t times
+    /// their size, with tolerance t, and what rounding adds. Farther away, the weights of a small tetrahedron are nothing but
+    /// rounding.
     fn place_in_reach(&self, p: [f32; 3]) -> Option<([u32; 3], Vec3)> {
         let (cell, x) = place(&self.tree.grid, p)?;
         let grow = self.tolerance.min(1e10) * 3.0 + two_to(-16);

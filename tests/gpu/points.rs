@@ -270,13 +270,16 @@ fn no_point_strictly_inside_a_sliver_is_lost() {
     }
 }
 
+fn tree_over(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions) -> Tree {
+    Tree::build(gpu, &DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap(), options).unwrap()
+}
+
 /// A hint must not lead a point that is not finite to an owner, nor may a tolerance decide that is none.
 #[test]
 fn what_is_no_number_has_no_owner() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let mesh = kuhn([4; 3]).unwrap();
-    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let tree = tree_over(&gpu, &mesh, &BuildOptions::default());
     let inside = [1.3, 2.1, 1.7];
     let mut points = vec![inside; 32];
     for (k, nowhere) in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().enumerate() {
@@ -301,8 +304,7 @@ fn what_is_no_number_has_no_owner() {
 fn coordinates_of_corners_have_no_sign() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let mesh = kuhn([3; 3]).unwrap();
-    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let tree = tree_over(&gpu, &mesh, &BuildOptions::default());
     let found = locate(&tree, &mesh.points, None, &LocateOptions::default(), SILENT).unwrap();
     assert!(
         found.barycentrics.iter().all(|b| b.iter().all(|w| w.is_sign_positive()) && b.iter().any(|w| *w > 0.9999)),
@@ -323,10 +325,9 @@ fn far_outside_there_are_no_owners() {
     points.extend((0..20_000u32).map(|i| [0, 1, 2].map(|k| -60_000.0 + (mix(3 * i + k) >> 8) as f32 * (59_000.0 / 16_777_216.0))));
     // Just outside of the bounds, within the tolerance.
     points.push([far + 2e-5, far - 1.0, far - 1.0]);
-    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     for (lists, level, tolerance) in [(Lists::Boundary, None, 1e-5), (Lists::All, Some(0), 0.0), (Lists::Boundary, Some(10), 1e-2)] {
         let options = BuildOptions { lists, level, ..BuildOptions::default() };
-        let tree = Tree::build(&gpu, &device, &options).unwrap();
+        let tree = tree_over(&gpu, &mesh, &options);
         for method in [LocateMethod::Descent, LocateMethod::Traversal(8)] {
             let found = locate(&tree, &points, None, &LocateOptions { method, tolerance }, SILENT).unwrap();
             let owned = found.owners[..points.len() - 1].iter().filter(|&&owner| owner != u32::MAX).count();

@@ -216,8 +216,8 @@ pub unsafe extern "C" fn olbvh_nearest_parts(count: u32, memory: OlbvhBuffer, ou
 
 /// Records the search for the place of the surface that is closest to each point, as `olbvh_nearest` finds it. Of
 /// `location`, only points, stride and count are used. `unfinished` of `olbvh_nearest_parts` says whether more rounds are
-/// needed; until then, what was found is a place, but need not be the closest. Points near the surface take one or two
-/// rounds, those deep inside many: 38 for points anywhere in a grid of 32 x 32 x 32 cubes.
+/// needed; until then, a point has no coordinates yet, and its tetrahedron need not be the closest. Points deep inside take
+/// many rounds: in a grid of 32 x 32 x 32 cubes, 27 for points anywhere, 54 around its middle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_cmd_nearest(
     recording: *mut OlbvhRecording,
