@@ -39,7 +39,7 @@
 /*
  Version of this interface. A header and a library with different versions are incompatible.
  */
-#define OLBVH_ABI 5
+#define OLBVH_ABI 6
 
 /*
  What stands for an owner where there is none.
@@ -1154,6 +1154,15 @@ enum olbvh_status olbvh_mesh_upload(const struct olbvh_gpu *gpu,
                                     struct olbvh_mesh **out);
 
 /*
+ The same tetrahedra with their points elsewhere, as a simulation moves them: three floats for each point of `mesh`, which
+ stays as it is, like its trees. Neighbours, whose search takes most of the time of an upload, are taken over, unless the
+ mesh has invalid tetrahedra.
+ */
+enum olbvh_status olbvh_mesh_moved(const struct olbvh_mesh *mesh,
+                                   const float *points,
+                                   struct olbvh_mesh **out);
+
+/*
  Frees the handle of a mesh; null is allowed.
  */
 void olbvh_mesh_free(struct olbvh_mesh *mesh);
@@ -1210,6 +1219,20 @@ enum olbvh_status olbvh_locate(const struct olbvh_tree *tree,
                                float tolerance,
                                uint32_t *owners,
                                float *barycentrics);
+
+/*
+ Samples a field at `count` points (three floats each). `values` has `components` floats, 1 or more, for each point of the
+ mesh, or for each tetrahedron if `on_cells` is not 0, such as the three of a velocity next to each other. `results` gets
+ as many for each point, NaN outside of the mesh. `tolerance` as for `olbvh_locate`.
+ */
+enum olbvh_status olbvh_sample(const struct olbvh_tree *tree,
+                               const float *points,
+                               size_t count,
+                               float tolerance,
+                               const float *values,
+                               uint32_t components,
+                               uint32_t on_cells,
+                               float *results);
 
 /*
  Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), inside or outside:
@@ -1426,13 +1449,15 @@ enum olbvh_status olbvh_cmd_nearest(struct olbvh_recording *recording,
                                     struct olbvh_rounds rounds);
 
 /*
- Records the interpolation of a field at points that have been located: a float each in `values`, NaN for a point
- without an owner. Of `location`, only count, owners and barycentrics are used; compute shaders read the latter two.
+ Records the interpolation of a field at points that have been located. `field` has `components` floats for each point or
+ tetrahedron of the mesh, such as 3 of a velocity, and `values` gets as many for each located point, NaN for one without
+ an owner. Of `location`, only count, owners and barycentrics are used; compute shaders read the latter two.
  */
 enum olbvh_status olbvh_cmd_interpolate(struct olbvh_recording *recording,
                                         const struct olbvh_scene *scene,
                                         const struct olbvh_location *location,
                                         const struct olbvh_field *field,
+                                        uint32_t components,
                                         struct olbvh_buffer values);
 
 /*

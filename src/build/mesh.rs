@@ -33,7 +33,7 @@ pub(crate) struct KeptMesh {
 #[derive(Debug)]
 struct MeshMemory {
     _positions: Buffer,
-    _cells: Buffer,
+    cells: Arc<Buffer>,
     arrays: Buffer,
 }
 
@@ -92,20 +92,62 @@ impl DeviceMesh {
         let thin = (!crowded.is_empty()).then(thin).transpose()?;
         let given = Given { grid: grid.as_ref().map(Buffer::all), thin: thin.as_ref().map(|thin| (thin.all(), crowded.len() as u32)) };
         let positions = gpu.upload("olbvh.mesh.positions", points)?;
-        let cells = gpu.upload("olbvh.mesh.cells", tets)?;
-        let input = MeshInput { positions: positions.all(), stride: 3, points: n_points, cells: cells.all(), tets: n_tets };
-        let carve = |a: &mut Arena| MeshArrays::carve(a, n_points, n_tets);
-        let (memory, arrays) = Arena::reserve(gpu, "olbvh.mesh.arrays", carve)?;
+        let cells = Arc::new(gpu.upload("olbvh.mesh.cells", tets)?);
+        Self::new(gpu, positions, cells, [n_points, n_tets], |stage0, _| Self::prepare(gpu, stage0, given))
+    }
+
+    /// The same cells with their points elsewhere, as a simulation moves them: what [`DeviceMesh::upload_slices`] makes of
+    /// these, without the search for neighbours, which takes most of its time, unless the mesh has bad tetrahedra. This mesh
+    /// and its trees stay as they are; memory for the cells is shared.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for another number of points, else as [`DeviceMesh::upload`].
+    pub fn moved(&self, points: &[[f32; 3]]) -> Result<Self> {
+        let MeshInput { points: n_points, tets, .. } = *self.input();
+        if points.len() != n_points as usize {
+            return Err(Error::Invalid(format!("{} points for a mesh of {n_points}", points.len())));
+        }
+        let positions = self.gpu.upload("olbvh.mesh.positions", points)?;
+        // Tetrahedra that are or were bad lack neighbours that they would have now.
+        let whole = self.status.bad == 0 && self.status.parted == 0;
+        let (gpu, from) = (&self.gpu, self.arrays());
+        Self::new(gpu, positions, self.kept.memory.cells.clone(), [n_points, tets], |stage0, to| {
+            if !whole {
+                return Self::prepare(gpu, stage0, Given::default());
+            }
+            let ((), times) = gpu.submit("olbvh.mesh.moved", |r| {
+                r.stage("mesh.copy", |r| {
+                    r.copy(from.status.part(0, size_of::<MeshStatus>() as u64), to.status);
+                    r.copy(from.neighbours.part(0, 16 * u64::from(tets)), to.neighbours);
+                    Ok(())
+                })?;
+                r.barrier("mesh.copy → mesh.clear");
+                stage0.shift(r)
+            })?;
+            Ok(times)
+        })
+    }
+
+    /// A mesh of these buffers, by a function that runs stage 0.
+    fn new(
+        gpu: &Gpu,
+        positions: Buffer,
+        cells: Arc<Buffer>,
+        [points, tets]: [u32; 2],
+        prepare: impl FnOnce(&Stage0<'_>, &MeshArrays) -> Result<StageTimes>,
+    ) -> Result<Self> {
+        let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
+        let (memory, arrays) = Arena::reserve(gpu, "olbvh.mesh.arrays", |a: &mut Arena| MeshArrays::carve(a, points, tets))?;
         let (_memory, scratch) = Self::scratch(gpu, &input)?;
-        let times = Self::prepare(gpu, &Stage0::new(&input, &arrays, &scratch)?, given)?;
+        let times = prepare(&Stage0::new(&input, &arrays, &scratch)?, &arrays)?;
         let status: MeshStatus = gpu.download_one(&memory, arrays.status)?;
         let grid: Grid = gpu.download_one(&memory, arrays.grid)?;
         if status.overflow != 0 {
             return Err(Error::TooLarge(format!(
-                "the table of faces is full: too few of the {n_tets} tetrahedra share faces; they can be taken in blocks (`olbvh::blocks`)"
+                "the table of faces is full: too few of the {tets} tetrahedra share faces; they can be taken in blocks (`olbvh::blocks`)"
             )));
         }
-        let memory = Arc::new(MeshMemory { _positions: positions, _cells: cells, arrays: memory });
+        let memory = Arc::new(MeshMemory { _positions: positions, cells, arrays: memory });
         let kept = KeptMesh { view: MeshView { input, arrays }, memory };
         Ok(Self { gpu: gpu.clone(), kept, grid, status, times })
     }

@@ -35,7 +35,7 @@ pub(crate) use plan::{CountScratch, FilterScratch, SortedScratch};
 pub(crate) use plan::{SHARE, filtered};
 pub(crate) use prepare::check_points;
 pub use prepare::{MAX_TETS, MeshArrays, MeshInput, MeshScratch, MeshView, cmd_move_mesh, cmd_prepare_mesh};
-pub(crate) use ranges::check_field;
+pub(crate) use ranges::{check_components, check_field};
 pub use ranges::{cmd_ranges, range_bytes};
 pub use scene::{PlacedScene, SceneBytes, ScenePlan};
 pub use tree::Tree;

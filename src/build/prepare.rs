@@ -44,6 +44,11 @@ pub struct MeshInput {
 }
 
 impl MeshInput {
+    /// Numbers of points and tetrahedra.
+    pub(crate) fn sizes(&self) -> [usize; 2] {
+        [self.points as usize, self.tets as usize]
+    }
+
     /// Rejects sizes that shaders cannot number, and parts that are too small.
     pub(super) fn check(&self) -> Result<()> {
         check_tets(self.tets)?;

@@ -13,8 +13,17 @@ pub fn range_bytes(nodes: u32) -> u64 {
 }
 
 /// Rejects a field with fewer values than the mesh has points, or tetrahedra.
-pub(crate) fn check_field((values, on): (BufferRef, On), mesh: &MeshInput) -> Result<()> {
-    values.check(4 * u64::from(if on == On::Points { mesh.points } else { mesh.tets }), "a field")
+pub(crate) fn check_field(field: (BufferRef, On), mesh: &MeshInput) -> Result<()> {
+    check_components(field, 1, mesh)
+}
+
+/// [`check_field`] for a field of several components, next to each other.
+pub(crate) fn check_components((values, on): (BufferRef, On), components: u32, mesh: &MeshInput) -> Result<()> {
+    let count = u64::from(components) * u64::from(if on == On::Points { mesh.points } else { mesh.tets });
+    if count > 1 << 31 {
+        return Err(Error::TooLarge(format!("a field of {count} values; shaders number 2^31 floats at most")));
+    }
+    values.check(4 * count, "a field")
 }
 
 /// Records the computation of a field's ranges (one float per point or per tetrahedron of the mesh) into `ranges`,

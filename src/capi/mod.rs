@@ -74,26 +74,29 @@ pub struct OlbvhMesh(Arc<HeldMesh>);
 struct HeldMesh {
     device: DeviceMesh,
     /// The caller's number of each tetrahedron and of each point, if the mesh was reordered.
-    ids: Option<[Vec<u32>; 2]>,
+    ids: Option<Arc<[Vec<u32>; 2]>>,
     copy: query::HostCopy,
 }
 
 impl HeldMesh {
     /// The caller's number of a tetrahedron; `NONE` stays `NONE`.
     fn cell(&self, tet: u32) -> u32 {
-        self.ids.as_ref().and_then(|[cells, _]| cells.get(tet as usize).copied()).unwrap_or(tet)
+        self.ids.as_ref().and_then(|ids| ids[0].get(tet as usize).copied()).unwrap_or(tet)
     }
 
-    /// The caller's field, brought into the order of the mesh.
+    /// The caller's field, with so many floats for each point or tetrahedron, brought into the order of the mesh.
     ///
     /// # Safety
     /// See [`crate::capi`].
-    unsafe fn field(&self, values: *const f32, on_cells: u32) -> Result<(Vec<f32>, On)> {
+    unsafe fn field(&self, values: *const f32, on_cells: u32, components: u32) -> Result<(Vec<f32>, On)> {
         let (on, mesh) = (on(on_cells), self.device.input());
+        let items = if on == On::Points { mesh.points } else { mesh.tets } as usize;
+        let components = components as usize;
         // SAFETY: the caller keeps the rules of `capi`.
-        let values = unsafe { array(values, if on == On::Points { mesh.points } else { mesh.tets } as usize, "values")? };
-        let ids = self.ids.as_ref().map(|[cells, points]| if on == On::Points { points } else { cells });
-        Ok((ids.map_or_else(|| values.to_vec(), |ids| ids.iter().map(|&i| values[i as usize]).collect()), on))
+        let values = unsafe { array(values, items.saturating_mul(components), "values")? };
+        let ids = self.ids.as_ref().map(|ids| &ids[usize::from(on == On::Points)]);
+        let of = |&i: &u32| &values[i as usize * components..][..components];
+        Ok((ids.map_or_else(|| values.to_vec(), |ids| ids.iter().flat_map(of).copied().collect()), on))
     }
 }
 
@@ -362,7 +365,7 @@ pub extern "C" fn olbvh_version() -> *const c_char {
 }
 
 /// Version of this interface. A header and a library with different versions are incompatible.
-pub const OLBVH_ABI: u32 = 5;
+pub const OLBVH_ABI: u32 = 6;
 /// What stands for an owner where there is none.
 pub const OLBVH_NONE: u32 = u32::MAX;
 /// The bit of a voxel's owner that says that the voxel is merely touched.
@@ -417,9 +420,28 @@ pub unsafe extern "C" fn olbvh_mesh_upload(
             (DeviceMesh::upload_slices(gpu, points, tets)?, None)
         } else {
             let mesh = Mesh::new(points.to_vec(), tets.to_vec()).along_curve()?;
-            (DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?, mesh.cell_ids.zip(mesh.point_ids).map(<[_; 2]>::from))
+            (DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?, mesh.cell_ids.zip(mesh.point_ids).map(|ids| Arc::new(ids.into())))
         };
         give(out, OlbvhMesh(Arc::new(HeldMesh { device, ids, copy: query::HostCopy::default() })));
+        Ok(())
+    })
+}
+
+/// The same tetrahedra with their points elsewhere, as a simulation moves them: three floats for each point of `mesh`, which
+/// stays as it is, like its trees. Neighbours, whose search takes most of the time of an upload, are taken over, unless the
+/// mesh has invalid tetrahedra.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn olbvh_mesh_moved(mesh: *const OlbvhMesh, points: *const f32, out: *mut *mut OlbvhMesh) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (OlbvhMesh(mesh), out) = unsafe { (handle(mesh, "mesh")?, place(out)?) };
+        // SAFETY: the caller keeps the rules of `capi`.
+        let points: &[[f32; 3]] = unsafe { array(points.cast(), mesh.device.input().points as usize, "points")? };
+        let device = match &mesh.ids {
+            None => mesh.device.moved(points)?,
+            Some(ids) => mesh.device.moved(&ids[1].iter().map(|&i| points[i as usize]).collect::<Vec<_>>())?,
+        };
+        give(out, OlbvhMesh(Arc::new(HeldMesh { device, ids: mesh.ids.clone(), copy: query::HostCopy::default() })));
         Ok(())
     })
 }

@@ -217,6 +217,37 @@ pub unsafe extern "C" fn olbvh_locate(
     })
 }
 
+/// Samples a field at `count` points (three floats each). `values` has `components` floats, 1 or more, for each point of the
+/// mesh, or for each tetrahedron if `on_cells` is not 0, such as the three of a velocity next to each other. `results` gets
+/// as many for each point, NaN outside of the mesh. `tolerance` as for `olbvh_locate`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn olbvh_sample(
+    tree: *const OlbvhTree,
+    points: *const f32,
+    count: usize,
+    tolerance: f32,
+    values: *const f32,
+    components: u32,
+    on_cells: u32,
+    results: *mut f32,
+) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (OlbvhTree { mesh, tree, .. }, points) = unsafe { (handle(tree, "tree")?, array(points.cast(), count, "points")?) };
+        if components == 0 {
+            return Err(Error::Invalid("components is 0".into()));
+        }
+        let size = count.saturating_mul(components as usize);
+        // SAFETY: the caller keeps the rules of `capi`.
+        let (results, (values, on)) = unsafe { (array_mut(results, size, "results")?, mesh.field(values, on_cells, components)?) };
+        let options = LocateOptions { tolerance: self::tolerance(tolerance), ..LocateOptions::default() };
+        let sampled = locate(tree, points, Some((&values, on)), &options, SILENT)?.values;
+        // A mesh without points or cells has no components.
+        fill(&mut results.iter_mut(), sampled.into_iter().chain(std::iter::repeat(f32::NAN)));
+        Ok(())
+    })
+}
+
 /// Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), inside or outside:
 /// the tetrahedron with it, or `OLBVH_NONE` if none is at most `within` away, a length like the coordinates. However large
 /// `within` is, places farther away than some limit, which lies between half of the mesh's largest extent and all of it,
@@ -290,7 +321,7 @@ pub unsafe extern "C" fn olbvh_render(
         settings.check()?;
         let [width, height] = settings.size.map(|n| n as usize);
         // SAFETY: the caller keeps the rules of `capi`.
-        let (pixels, (values, on)) = unsafe { (array_mut(pixels.cast(), width * height, "pixels")?, mesh.field(values, on_cells)?) };
+        let (pixels, (values, on)) = unsafe { (array_mut(pixels.cast(), width * height, "pixels")?, mesh.field(values, on_cells, 1)?) };
         let field = Field { name: "values".into(), on, values };
         let (plan, normals) = mesh.prepare(&settings, tree.grid().into(), &field)?;
         let normals = (!normals.is_empty()).then_some(&normals[..]);
@@ -323,7 +354,7 @@ pub unsafe extern "C" fn olbvh_slice(
         // SAFETY: the caller keeps the rules of `capi`.
         let (answers, results) = unsafe { (wanted(answers, count, "answers")?, wanted(results, count, "results")?) };
         // SAFETY: the caller keeps the rules of `capi`.
-        let field = if results.is_empty() { None } else { Some(unsafe { mesh.field(values, on_cells)? }) };
+        let field = if results.is_empty() { None } else { Some(unsafe { mesh.field(values, on_cells, 1)? }) };
         let (mut answers, mut results) = (answers.iter_mut(), results.iter_mut());
         let extrapolate = if linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
         let mut sink = |band: Band| {

@@ -52,12 +52,23 @@ pub enum On {
 impl On {
     /// Rejects values whose number differs from the mesh's number of points, or tetrahedra.
     pub(crate) fn check(self, values: &[f32], [points, tets]: [usize; 2]) -> Result<()> {
-        let expected = if self == Self::Points { points } else { tets };
-        if values.len() == expected {
-            return Ok(());
+        match self.components(values, [points, tets])? {
+            1 => Ok(()),
+            several => Err(Error::Invalid(format!("a field of {several} components; this takes one"))),
         }
-        let what = if self == Self::Points { "points" } else { "tetrahedra" };
-        Err(Error::Invalid(format!("a field of {} values where the mesh has {expected} {what}", values.len())))
+    }
+
+    /// How many values there are for each of the mesh's points, or tetrahedra. Rejects any other number of values than a
+    /// multiple of theirs.
+    pub(crate) fn components(self, values: &[f32], [points, tets]: [usize; 2]) -> Result<usize> {
+        let (expected, what) = if self == Self::Points { (points, "points") } else { (tets, "tetrahedra") };
+        if values.len() == expected {
+            return Ok(1);
+        }
+        if values.is_empty() || expected == 0 || !values.len().is_multiple_of(expected) {
+            return Err(Error::Invalid(format!("a field of {} values where the mesh has {expected} {what}", values.len())));
+        }
+        Ok(values.len() / expected)
     }
 }
 

@@ -1,8 +1,8 @@
 //! Point location (SPEC 3.1): the owner of each point, its barycentric coordinates, and values of fields there.
 
 use super::order::{PointOrder, cmd_sort_points};
-use super::{Progress, Scene, list_parts, upload_field};
-use crate::build::{Tree, check_field, check_points};
+use super::{Progress, Scene, list_parts};
+use crate::build::{Tree, check_components, check_points};
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, BufferRef, DeviceKind, Gpu, Groups, Recorder};
 use crate::grid::MAX_LEVEL;
@@ -240,27 +240,36 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
     })
 }
 
-/// Records the values of a field (one float per point of the mesh or per tetrahedron) at located points: one float for
-/// each point, NaN without an owner. Compute shaders read `located`, the field and the mesh and write `values`. There
-/// is no barrier before or after: the caller records one between `cmd_locate` and this function.
+/// Records the values of a field at located points. The field has `components` floats per point of the mesh or per
+/// tetrahedron, such as 3 of a velocity, and `values` gets as many for each located point, NaN without an owner. Compute
+/// shaders read `located`, the field and the mesh and write `values`. There is no barrier before or after: the caller
+/// records one between `cmd_locate` and this function.
 ///
 /// # Errors
-/// [`Error::Invalid`] if a part is too small, [`Error::Vulkan`] if the pipeline cannot be made.
+/// [`Error::Invalid`] if a part is too small or there are no components, [`Error::TooLarge`] for more than 2^31 floats,
+/// [`Error::Vulkan`] if the pipeline cannot be made.
 pub fn cmd_interpolate(
     r: &mut Recorder<'_>,
     scene: &Scene,
     (field, on): (BufferRef, On),
+    components: u32,
     located: &LocateOutput,
-    values: BufferRef,
-    count: u32,
+    (values, count): (BufferRef, u32),
 ) -> Result<()> {
-    check_field((field, on), &scene.mesh.input)?;
+    let floats = u64::from(components) * u64::from(count);
+    if components == 0 {
+        return Err(Error::Invalid("a field of no components".into()));
+    }
+    if floats > 1 << 31 {
+        return Err(Error::TooLarge(format!("{floats} values at once; shaders number 2^31 floats at most")));
+    }
+    check_components((field, on), components, &scene.mesh.input)?;
     located.check(count)?;
-    values.check(4 * u64::from(count), "values")?;
+    values.check(4 * floats, "values")?;
     let workgroup = r.gpu().target().query;
     let LocateOutput { owners, barycentrics } = *located;
     let spec = InterpolateSpec { workgroup, on_cells: u32::from(on == On::Cells), ..Default::default() };
-    let arguments = Interpolate { cells: scene.mesh.input.cells, field, owners, barycentrics, values, count };
+    let arguments = Interpolate { cells: scene.mesh.input.cells, field, owners, barycentrics, values, count, components };
     r.stage("query.interpolate", |r| r.dispatch(&arguments, spec, Groups::Count(count.div_ceil(workgroup))))
 }
 
@@ -285,14 +294,15 @@ pub struct Located {
     pub owners: Vec<u32>,
     /// Barycentric coordinates in the order of the tetrahedron's vertices.
     pub barycentrics: Vec<[f32; 4]>,
-    /// Values of the given field; empty if none was given.
+    /// Values of the given field, as many for each point as it has components; empty if none was given.
     pub values: Vec<f32>,
     /// What it took.
     pub times: StageTimes,
 }
 
 /// Locates points, whose coordinates are relative to the mesh's origin. `field` has values and says whether they belong
-/// to points or tetrahedra. `report` receives the number of points done and their total.
+/// to points or tetrahedra, each of which may have several, such as the three of a velocity, next to each other. `report`
+/// receives the number of points done and their total.
 ///
 /// # Errors
 /// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length or the tolerance is
@@ -306,13 +316,14 @@ pub fn locate(
 ) -> Result<Located> {
     let gpu = tree.gpu();
     let scene = Scene::of(tree);
-    let field = field.map(|field| upload_field(gpu, &scene.mesh.input, field)).transpose()?;
+    let components = field.map_or(Ok(1), |(values, on)| on.components(values, scene.mesh.input.sizes()))?;
+    let field = field.map(|(values, on)| Ok((gpu.upload("olbvh.query.field", values)?, on))).transpose()?;
     let mut all = Located::default();
-    let at_once = points_at_once(scene.longest_leaf);
+    let at_once = (points_at_once(scene.longest_leaf) / components).max(1);
     let most = points.len().min(at_once) as u64;
     let owners = gpu.buffer("olbvh.query.owners", 4 * most)?;
     let barycentrics = gpu.buffer("olbvh.query.barycentrics", 16 * most)?;
-    let values = field.as_ref().map(|_| gpu.buffer("olbvh.query.values", 4 * most)).transpose()?;
+    let values = field.as_ref().map(|_| gpu.buffer("olbvh.query.values", 4 * components as u64 * most)).transpose()?;
     let method = match options.method {
         LocateMethod::Suited => LocateMethod::suited(points.len(), scene.mesh.input.tets as usize, false),
         method => method,
@@ -334,14 +345,14 @@ pub fn locate(
             cmd_locate(r, &scene, &input, &output, options)?;
             if let (Some((field, on)), Some(values)) = (&field, &values) {
                 r.barrier("locate → interpolate");
-                cmd_interpolate(r, &scene, (field.all(), *on), &output, values.all().part(0, 4 * n), count)?;
+                cmd_interpolate(r, &scene, (field.all(), *on), components as u32, &output, (values.all(), count))?;
             }
             Ok(())
         })?;
         all.owners.extend(gpu.download::<u32>(&owners, output.owners)?);
         all.barycentrics.extend(gpu.download::<[f32; 4]>(&barycentrics, output.barycentrics)?);
         if let Some(values) = &values {
-            all.values.extend(gpu.download::<f32>(values, values.all().part(0, 4 * n))?);
+            all.values.extend(gpu.download::<f32>(values, values.all().part(0, 4 * components as u64 * n))?);
         }
         all.times.add(times);
         report(all.owners.len() as u64, points.len() as u64)?;

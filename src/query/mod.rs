@@ -95,7 +95,7 @@ pub(crate) fn until_done<T>(
 
 /// Uploads the values of a field, one per point or tetrahedron of the mesh.
 fn upload_field(gpu: &Gpu, mesh: &MeshInput, (values, on): (&[f32], On)) -> Result<(Buffer, On)> {
-    on.check(values, [mesh.points as usize, mesh.tets as usize])?;
+    on.check(values, mesh.sizes())?;
     Ok((gpu.upload("olbvh.query.field", values)?, on))
 }
 

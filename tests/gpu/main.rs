@@ -47,6 +47,7 @@ mod slice;
 #[path = "../submit/mod.rs"]
 mod submit;
 mod targets;
+mod values;
 
 fn with(binding: Binding, check: fn(&Gpu)) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();

@@ -1,7 +1,9 @@
-//! Points that are not finite for a while: the tetrahedra there are left out, and nothing else is lost, then or later.
+//! Meshes whose points move: the same as if they were uploaded anew. Points that are not finite for a while: the tetrahedra
+//! there are left out, and nothing else is lost, then or later.
 
 use crate::host::Frame;
 use crate::submit::submit;
+use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::layout::MeshStatus;
 use olbvh::mesh::{Mesh, kuhn_jittered};
@@ -56,4 +58,36 @@ fn what_is_bad_for_a_while_is_left_out_for_as_long() {
     }
     // Whole again, the mesh keeps the boundary of the hole, until it is prepared anew.
     assert!(boundary[2] > boundary[0] && boundary[1] == boundary[3], "{boundary:?}");
+}
+
+/// Everything that is computed of a mesh, but for what tells of its past.
+fn all_of(mesh: &DeviceMesh) -> impl PartialEq + std::fmt::Debug + use<> {
+    let status = MeshStatus { parted: 0, ..*mesh.status() };
+    let vertices: Vec<_> = mesh.vertices().unwrap().into_iter().map(|v| v.map(f32::to_bits)).collect();
+    (status, *mesh.grid(), mesh.boundary_bits().unwrap(), mesh.neighbours().unwrap(), vertices, mesh.bad_cells().unwrap())
+}
+
+#[test]
+fn a_moved_mesh_is_the_one_that_would_be_uploaded() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let whole = kuhn_jittered([5, 4, 6], 0.2, 3).unwrap();
+    let first = DeviceMesh::upload(&gpu, &whole, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &first, &BuildOptions::default()).unwrap();
+    let before = (all_of(&first), tree.download().unwrap());
+    let bent = |mesh: &Mesh| {
+        let points = mesh.points.iter().map(|&[x, y, z]| [x + 0.1 * z * z, 3.0 * y, z - 0.2 * x]).collect();
+        Mesh::new(points, mesh.tets.clone())
+    };
+    let mut held = first;
+    for (step, mesh) in [bent(&whole), torn(&whole), torn(&bent(&whole)), bent(&whole), whole.clone()].iter().enumerate() {
+        held = held.moved(&mesh.points).unwrap();
+        let anew = DeviceMesh::upload(&gpu, mesh, BadCells::Skip).unwrap();
+        assert_eq!(all_of(&held), all_of(&anew), "step {step}");
+        let trees = [&held, &anew].map(|mesh| Tree::build(&gpu, mesh, &BuildOptions::default()).unwrap().download().unwrap());
+        assert_eq!(trees[0], trees[1], "step {step}");
+        let searched = held.times().stages.iter().any(|stage| stage.name == "mesh.faces");
+        assert_eq!(searched, step == 2 || step == 3, "step {step}: {:?}", held.times().stages);
+    }
+    assert_eq!((all_of(&held), tree.download().unwrap()), before);
+    assert!(held.moved(&whole.points[1..]).unwrap_err().to_string().contains("points for a mesh of"));
 }

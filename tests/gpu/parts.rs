@@ -118,12 +118,16 @@ fn fields_and_their_values() {
     let (count, nodes) = (100, tree.capacity.nodes);
     let (located, values) = (LocateOutput { owners: lab.part(400), barycentrics: lab.part(1600) }, lab.part(400));
     for (on, field) in [(On::Points, lab.part(4 * points)), (On::Cells, lab.part(4 * tets))] {
-        let interpolate = |field, located, values| lab.rehearse(|r| cmd_interpolate(r, &scene, (field, on), &located, values, count));
+        let interpolate = |field, located, values| lab.rehearse(|r| cmd_interpolate(r, &scene, (field, on), 1, &located, (values, count)));
         interpolate(field, located, values).unwrap();
         refused(interpolate(less(field), located, values), "a field");
         refused(interpolate(field, LocateOutput { owners: less(located.owners), ..located }, values), "owners");
         refused(interpolate(field, LocateOutput { barycentrics: less(located.barycentrics), ..located }, values), "barycentrics");
         refused(interpolate(field, located, less(values)), "values");
+        let several = |many| lab.rehearse(|r| cmd_interpolate(r, &scene, (field, on), many, &located, (values, count)));
+        assert!(matches!(several(0), Err(olbvh::Error::Invalid(_))));
+        refused(several(2), "a field");
+        assert!(matches!(several(u32::MAX), Err(olbvh::Error::TooLarge(_))));
 
         let ranges = lab.part(range_bytes(nodes));
         let gather = |field, ranges| lab.rehearse(|r| cmd_ranges(r, &view, tree, (field, on), ranges));

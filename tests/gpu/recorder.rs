@@ -143,7 +143,7 @@ fn location() {
         r.barrier("sort_points → locate");
         cmd_locate(r, &scene, &points, &frame.output, &LocateOptions { method: LocateMethod::Sorted, ..LocateOptions::default() })?;
         r.barrier("locate → interpolate");
-        cmd_interpolate(r, &scene, (field.all(), On::Points), &frame.output, values.all(), frame.points.count)?;
+        cmd_interpolate(r, &scene, (field.all(), On::Points), 1, &frame.output, (values.all(), frame.points.count))?;
         r.barrier("interpolate → caller");
         read(r, &[values.all()], &sink);
         Ok(())

@@ -77,6 +77,6 @@ impl Body {
         let scene = Scene::recorded(scene.mesh, scene.tree);
         cmd_locate(r, &scene, input, output, &LocateOptions::default())?;
         r.barrier("frame.owners → frame.values");
-        cmd_interpolate(r, &scene, (self.held[0].all(), On::Points), output, self.values.all(), input.count)
+        cmd_interpolate(r, &scene, (self.held[0].all(), On::Points), 1, output, (self.values.all(), input.count))
     }
 }

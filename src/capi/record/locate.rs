@@ -236,14 +236,16 @@ pub unsafe extern "C" fn olbvh_cmd_nearest(
     })
 }
 
-/// Records the interpolation of a field at points that have been located: a float each in `values`, NaN for a point
-/// without an owner. Of `location`, only count, owners and barycentrics are used; compute shaders read the latter two.
+/// Records the interpolation of a field at points that have been located. `field` has `components` floats for each point or
+/// tetrahedron of the mesh, such as 3 of a velocity, and `values` gets as many for each located point, NaN for one without
+/// an owner. Of `location`, only count, owners and barycentrics are used; compute shaders read the latter two.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn olbvh_cmd_interpolate(
     recording: *mut OlbvhRecording,
     scene: *const OlbvhScene,
     location: *const OlbvhLocation,
     field: *const OlbvhField,
+    components: u32,
     values: OlbvhBuffer,
 ) -> OlbvhStatus {
     border(|| {
@@ -251,6 +253,6 @@ pub unsafe extern "C" fn olbvh_cmd_interpolate(
         let ((r, OlbvhScene { scene, .. }), location) = unsafe { (begun_with(recording, scene, "scene")?, handle(location, "location")?) };
         // SAFETY: the caller keeps the rules of `capi`.
         let field = unsafe { handle(field, "field")? };
-        cmd_interpolate(r, scene, field.read(), &location.output(), values.part(), location.count)
+        cmd_interpolate(r, scene, field.read(), components, &location.output(), (values.part(), location.count))
     })
 }

@@ -262,7 +262,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
         ok(call!(olbvh_cmd_slice(recording, a.scene, &raw const slicing)));
         ok(call!(olbvh_cmd_locate(recording, a.scene, &raw const location)));
         ok(call!(olbvh_cmd_barrier(recording)));
-        ok(call!(olbvh_cmd_interpolate(recording, a.scene, &raw const location, &raw const field, interpolated.all().into())));
+        ok(call!(olbvh_cmd_interpolate(recording, a.scene, &raw const location, &raw const field, 1, interpolated.all().into())));
         // Hints are not used, whatever they are.
         let odd = OlbvhLocation { hints: OlbvhBuffer { size: 1, ..NOTHING }, ..location };
         ok(call!(olbvh_cmd_owners(recording, a.scene, &raw const odd, owner_memory.all().into(), lists.all().into())));
@@ -330,7 +330,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     refused(locate(OlbvhLocation { owners: less(location.owners, 1), ..location }), "owners");
     refused(locate(OlbvhLocation { barycentrics: less(location.barycentrics, 1), ..location }), "barycentrics");
     refused(locate(OlbvhLocation { path: 0, hints: less(location.owners, 1), ..location }), "hints");
-    let interpolate = |field: &OlbvhField, values| call!(olbvh_cmd_interpolate(recording, a.scene, &raw const location, field, values));
+    let interpolate = |field: &OlbvhField, values| call!(olbvh_cmd_interpolate(recording, a.scene, &raw const location, field, 1, values));
     refused(interpolate(&short, interpolated.all().into()), "a field");
     refused(interpolate(&field, less(interpolated.all().into(), 1)), "values");
     refused(call!(olbvh_cmd_ranges(recording, a.scene, &raw const field, less(ranges.all().into(), 1))), "ranges");
@@ -372,9 +372,13 @@ pub fn owned(gpu: *mut OlbvhGpu) {
         Prepared::new(&call!(settings.read()).unwrap(), &mesh, &valid, &field).unwrap()
     };
     let tree_of = |mesh: &Mesh, reorder: u32| -> *mut OlbvhTree {
-        let (points, tets) = (mesh.points.as_ptr().cast(), mesh.tets.as_ptr().cast());
-        let held: *mut OlbvhMesh =
+        // At twice the size, and then moved to where it belongs.
+        let double: Vec<[f32; 3]> = mesh.points.iter().map(|p| p.map(|x| 2.0 * x)).collect();
+        let (points, tets) = (double.as_ptr().cast(), mesh.tets.as_ptr().cast());
+        let first: *mut OlbvhMesh =
             made(|out| call!(olbvh_mesh_upload(gpu, points, mesh.points.len(), tets, mesh.tets.len(), reorder, out)));
+        let held: *mut OlbvhMesh = made(|out| call!(olbvh_mesh_moved(first, mesh.points.as_ptr().cast(), out)));
+        call!(olbvh_mesh_free(first));
         let tree = made(|out| call!(olbvh_tree_build(held, null(), out)));
         for level in [1, 4] {
             let options = OlbvhBuildOptions { level, ..olbvh_default_build_options() };
@@ -400,6 +404,7 @@ pub fn owned(gpu: *mut OlbvhGpu) {
         let mut owners = vec![0; middles.len()];
         ok(call!(olbvh_locate(tree, middles.as_ptr().cast(), middles.len(), -1.0, owners.as_mut_ptr(), null_mut())));
         assert!((0..).zip(&owners).all(|(tet, &owner)| tet == owner));
+        sampled(tree, &mesh, &middles);
         let (count, wanted) = (mesh.points.len(), &expected.nearest);
         let (mut owners, mut places, mut distances) = (vec![0; count], vec![[0f32; 4]; count], vec![0f32; count]);
         let [to_places, to_distances] = [places.as_mut_ptr().cast(), distances.as_mut_ptr()];
@@ -439,4 +444,25 @@ pub fn owned(gpu: *mut OlbvhGpu) {
     assert_eq!(call!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut())), OlbvhStatus::Invalid);
     assert!(message().contains("nowhere"), "{}", message());
     call!(olbvh_tree_free(other_tree));
+}
+
+/// Samples three components at the middles of all tetrahedra, and outside: numbers of the tetrahedra, and the coordinates.
+fn sampled(tree: *mut OlbvhTree, mesh: &Mesh, middles: &[[f32; 3]]) {
+    let mut points = middles.to_vec();
+    points.push([1e6; 3]);
+    let numbers: Vec<[f32; 2]> = (0..mesh.tets.len()).map(|t| [t as f32, -(t as f32)]).collect();
+    let sample = |values: *const f32, components, on_cells, results: *mut f32| {
+        call!(olbvh_sample(tree, points.as_ptr().cast(), points.len(), -1.0, values, components, on_cells, results))
+    };
+    let mut of_cells = vec![[0f32; 2]; points.len()];
+    ok(sample(numbers.as_ptr().cast(), 2, 1, of_cells.as_mut_ptr().cast()));
+    assert_eq!(of_cells[..middles.len()], numbers[..]);
+    let mut places = vec![[0f32; 3]; points.len()];
+    ok(sample(mesh.points.as_ptr().cast(), 3, 0, places.as_mut_ptr().cast()));
+    assert!(places.iter().zip(middles).all(|(a, b)| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4)));
+    assert!(of_cells[middles.len()].iter().chain(&places[middles.len()]).all(|v| v.is_nan()));
+    for (components, what) in [(3, "values"), (0, "components")] {
+        assert_eq!(sample(null(), components, 0, places.as_mut_ptr().cast()), OlbvhStatus::Invalid);
+        assert!(message().contains(what), "{}", message());
+    }
 }

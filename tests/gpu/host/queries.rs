@@ -117,7 +117,7 @@ impl Queries {
         cmd_count_owners(r, &self.scene, &self.points, &self.owners, &options)?;
         cmd_list_owners(r, &self.scene, &self.points, &self.owners, self.owner_lists)?;
         let count = self.points.count;
-        cmd_interpolate(r, &self.scene, (self.field.all(), On::Points), &self.located, self.values, count)?;
+        cmd_interpolate(r, &self.scene, (self.field.all(), On::Points), 1, &self.located, (self.values, count))?;
         let field = Some((self.field.all(), On::Points));
         let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest };
         cmd_slice(r, &self.scene, &input, &self.slice, Rounds::begin(2))?;
