@@ -169,6 +169,10 @@ float olbvh_value(uint owner, vec4 weights_of_owner) {
     return weighed(weights_of_owner, vec4(field.at[v.x], field.at[v.y], field.at[v.z], field.at[v.w]));
 }
 
+// The numbers of a tetrahedron's vertices, for fields in buffers of the host, of any number of components:
+// olbvh_weighed(weights, values at these vertices) is what olbvh_value computes.
+uvec4 olbvh_corners(uint owner) { return words(cells.at[owner]); }
+
 // The gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one, NaN without a field.
 vec3 olbvh_gradient(uint owner) {
     if (scene.at[0].has_field == 0u) return vec3(no_value());

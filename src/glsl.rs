@@ -19,6 +19,8 @@
 //!      and the first of them; `OLBVH_OWNERS` is 32 unless you define it
 //!    - `float olbvh_value(uint owner, vec4 weights)`: value of the field, which has one float per point; NaN without a
 //!      field
+//!    - `uvec4 olbvh_corners(uint owner)`: the numbers of its vertices, for further fields in buffers of your own, such as
+//!      velocities; `float olbvh_weighed(vec4 weights, vec4 values)` interpolates a component between them
 //!    - `vec3 olbvh_gradient(uint owner)`: gradient of the field
 //!    - `bool olbvh_traverse()`: the paper's traversal; define `OLBVH_TRAVERSE`, and after the inclusion
 //!      `bool olbvh_visit_node(olbvh_Node)` (descend?) and `bool olbvh_visit_leaf(olbvh_Node)` (done?)

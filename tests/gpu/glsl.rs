@@ -24,7 +24,7 @@ layout(set = 0, binding = 0) readonly buffer Points { float points[]; };
 layout(set = 0, binding = 1) writeonly buffer Out { uint found[]; };
 ";
 
-/// A kernel that writes nine words per point.
+/// A kernel that writes ten words per point.
 const ANSWERS: &str = r#"
 #include "olbvh.glsl"
 // Names that a host may use as well.
@@ -55,12 +55,15 @@ void main() {
     uint owners[OLBVH_OWNERS];
     met = OLBVH_NONE;
     olbvh_traverse();
-    found[9 * i] = owner;
-    found[9 * i + 1] = olbvh_owners(at, owners);
-    found[9 * i + 2] = owner == OLBVH_NONE ? 0u : floatBitsToUint(olbvh_value(owner, b));
-    found[9 * i + 3] = owner == OLBVH_NONE ? 0u : floatBitsToUint(olbvh_gradient(owner).y);
-    found[9 * i + 4] = met;
-    for (uint k = 0u; k < 4u; ++k) found[9 * i + 5 + k] = floatBitsToUint(b[k]);
+    found[10 * i] = owner;
+    found[10 * i + 1] = olbvh_owners(at, owners);
+    found[10 * i + 2] = owner == OLBVH_NONE ? 0u : floatBitsToUint(olbvh_value(owner, b));
+    found[10 * i + 3] = owner == OLBVH_NONE ? 0u : floatBitsToUint(olbvh_gradient(owner).y);
+    found[10 * i + 4] = met;
+    for (uint k = 0u; k < 4u; ++k) found[10 * i + 6 + k] = floatBitsToUint(b[k]);
+    // The first points are the vertices of the mesh.
+    uvec4 v = owner == OLBVH_NONE ? uvec4(0u) : 3u * olbvh_corners(owner);
+    found[10 * i + 5] = floatBitsToUint(olbvh_weighed(b, vec4(points[v.x], points[v.y], points[v.z], points[v.w])));
 }
 "#;
 
@@ -257,11 +260,11 @@ fn check(binding: Binding) {
         let tree = Tree::build(&gpu, &device, &BuildOptions { lists, slabs: true, ..BuildOptions::default() }).unwrap();
         let view = device.view();
         let (level, scene) = (tree.grid().level, SceneBuffers::new(&view, tree.memory(), Some(field.all())).unwrap());
-        let found = run::<9>(&gpu, ANSWERS, &scene, level, &points);
+        let found = run::<10>(&gpu, ANSWERS, &scene, level, &points);
         let options = LocateOptions::default();
         let expected = locate(&tree, &points, Some((&values, On::Points)), &options, SILENT).unwrap();
         let all = locate_all(&tree, &points, options.tolerance, SILENT).unwrap();
-        for (i, [owner, owners, value, slope, met, weights @ ..]) in found.into_iter().enumerate() {
+        for (i, [owner, owners, value, slope, met, x, weights @ ..]) in found.into_iter().enumerate() {
             let what = format!("{binding:?} {lists:?}: point {i} {:?}", points[i]);
             assert_eq!(owner, expected.owners[i], "{what}");
             if owner == u32::MAX {
@@ -273,11 +276,12 @@ fn check(binding: Binding) {
             assert_eq!(value, expected.values[i].to_bits(), "{what}");
             let p = points[i];
             assert!((f32::from_bits(value) - (3.0 + p[0] + 2.0 * p[1] - p[2])).abs() < 1e-3, "{what}: {}", f32::from_bits(value));
+            assert!((f32::from_bits(x) - p[0]).abs() < 1e-4, "{what}: {}", f32::from_bits(x));
             assert!((f32::from_bits(slope) - 2.0).abs() < 1e-2, "{what}: {}", f32::from_bits(slope));
             assert!(lists == Lists::Boundary || met <= owner, "{what}: the traversal has missed a leaf");
         }
         assert!(expected.owners.iter().filter(|o| **o == u32::MAX).count() > 100);
-        let without = run::<9>(&gpu, ANSWERS, &SceneBuffers::new(&view, tree.memory(), None).unwrap(), level, &mesh.points);
+        let without = run::<10>(&gpu, ANSWERS, &SceneBuffers::new(&view, tree.memory(), None).unwrap(), level, &mesh.points);
         assert!(without.iter().all(|found| found[2..4].iter().all(|&bits| f32::from_bits(bits).is_nan())), "values without a field");
         check_walks(&mesh, &device, &points, &expected, &run::<5>(&gpu, WALKS, &scene, level, &points));
         let nearest = [0, 1, 3].map(|stack| run::<2>(&gpu, &format!("#define OLBVH_STACK {stack}\n{NEAREST}"), &scene, level, &points));
