@@ -1164,6 +1164,10 @@ float olbvh_value(uint owner, vec4 weights_of_owner) {
     return olbvh_weighed(weights_of_owner, vec4(olbvh_field.at[v.x], olbvh_field.at[v.y], olbvh_field.at[v.z], olbvh_field.at[v.w]));
 }
 
+// The numbers of a tetrahedron's vertices, for fields in buffers of the host, of any number of components:
+// olbvh_weighed(weights, values at these vertices) is what olbvh_value computes.
+uvec4 olbvh_corners(uint owner) { return olbvh_words(olbvh_cells.at[owner]); }
+
 // The gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one, NaN without a field.
 vec3 olbvh_gradient(uint owner) {
     if (olbvh_scene.at[0].has_field == 0u) return vec3(olbvh_no_value());

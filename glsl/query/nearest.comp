@@ -13,6 +13,7 @@
 #include "shared/node.glsl"
 layout(constant_id = 2) const uint FRESH = 1;     // whether the search begins
 layout(constant_id = 3) const uint BUDGET = 1024; // nodes and tetrahedra per point and dispatch
+layout(constant_id = 4) const uint ORDERED = 0;   // whether points are taken in a given order
 ARGUMENTS(13)
     uint count;
     uint stride; // floats from one point to the next
@@ -26,13 +27,14 @@ RECORDS(7, vec4, vertices)
 RECORDS(8, uvec4, neighbours)
 BUFFER(9, readonly, float, points)
 BUFFER16(10, READ_WRITE, NearState, states)
-BUFFER16(11, writeonly, vec4, barycentrics)
+BUFFER(11, readonly, uint, order) // with ORDERED, the point of each place
 BUFFER(12, READ_WRITE, uint, unfinished)
 #include "shared/vertices.glsl"
 #include "shared/tree.glsl"
 #include "shared/quarters.glsl"
 #include "shared/boundary_node.glsl"
 #include "shared/points.glsl"
+#include "shared/patch.glsl"
 
 NearState state;
 vec3 x; // the point in normalised coordinates
@@ -53,32 +55,13 @@ uvec3 lo, hi;
 bool enters(Node node) { return is_boundary_node(node.index) && node_square(node) <= state.square; }
 #include "shared/leaf_walk.glsl"
 
-// The faces of a tetrahedron at the surface, and its vertices around the point.
-struct Patch {
-    uint faces;
-    uvec4 rank;
-    vec3 v[4];
-};
-
-uint surface_of(uvec4 rank, uvec4 beside) {
-    uint faces = 0u;
-    for (uint k = 0u; k < 4u; ++k) faces |= uint(beside[k] == NONE) << rank[k];
-    return faces;
-}
-
-Patch patch_of(uint t, uvec4 beside) {
-    Tet tet = load_tet(words(cells.at[t]));
-    vec3 v[4] = vec3[4](difference(tet.v[0], x), difference(tet.v[1], x), difference(tet.v[2], x), difference(tet.v[3], x));
-    return Patch(surface_of(tet.rank, beside), tet.rank, v);
-}
-
 // Keeps the closest of the entries [begin, end).
 void measure(uint begin, uint end) {
     for (uint e = begin; e < end; ++e) {
         uint t = listed_tet(e);
         uvec4 beside = words(neighbours.at[t]);
         if (all(notEqual(beside, uvec4(NONE)))) continue;
-        Patch part = patch_of(t, beside);
+        Patch part = patch_of(t, beside, x);
         if (box_square(part.v) > state.square) continue;
         vec4 unused;
         float square = closest_on(part.v, part.faces, unused);
@@ -137,14 +120,6 @@ bool measure_all(uint level) {
     return leaf == WALK_DONE;
 }
 
-// The weights of the closest place, in the caller's order of the vertices.
-vec4 place_on(uint t) {
-    Patch found = patch_of(t, words(neighbours.at[t]));
-    vec4 w;
-    closest_on(found.v, found.faces, w);
-    return vec4(w[found.rank.x], w[found.rank.y], w[found.rank.z], w[found.rank.w]);
-}
-
 // Begins or resumes the search for a point, if it has not ended before. Returns true if it needs another round.
 bool search(uint i) {
     Grid g = grid.at[0];
@@ -168,13 +143,12 @@ bool search(uint i) {
     }
     if (ended && state.owner == NONE) state.square = uintBitsToFloat(0x7f800000u);
     states.at[i] = state;
-    if (ended) barycentrics.at[i] = state.owner == NONE ? vec4(0.0) : place_on(state.owner);
     return !ended;
 }
 
 void main() {
     uint i = item_index(), left = 0u;
-    if (i < count) left = uint(search(i));
+    if (i < count) left = uint(search(ORDERED == 0u ? i : order.at[i]));
     left = subgroupAdd(left);
     if (subgroupElect() && left > 0u) atomicAdd(unfinished.at[0], left);
 }

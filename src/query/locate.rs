@@ -112,8 +112,8 @@ pub struct PointInput {
     /// time. Only valid tetrahedra of this mesh are allowed. It may be the same part as [`LocateOutput::owners`]: a point's
     /// hint is read before its owner is written, and no other point reads it.
     pub hints: Option<BufferRef>,
-    /// For methods that sort ([`LocateMethod::is_sorted`]): one word per place, the point that is located there; every
-    /// point occurs once. Answers are stored by point, not by place.
+    /// For methods that sort ([`LocateMethod::is_sorted`]), and for closest places: one word per place, the point that is
+    /// located there; every point occurs once. Answers are stored by point, not by place.
     pub order: Option<BufferRef>,
 }
 

@@ -1,11 +1,11 @@
 //! The place of the mesh's surface that is closest to each point, wherever the point lies.
 
-use super::{PointInput, Progress, Rounds, Scene, until_done};
+use super::{PointInput, PointOrder, Progress, Rounds, Scene, cmd_sort_points, until_done};
 use crate::build::Tree;
 use crate::error::Result;
 use crate::gpu::{Arena, BufferRef, Groups, Recorder};
 use crate::grid::{CellRange, canonical};
-use crate::kernels::{Nearest as NearestKernel, NearestSpec};
+use crate::kernels::{Nearest as NearestKernel, NearestPlaces, NearestPlacesSpec, NearestSpec};
 use crate::layout::{NONE, NearState};
 use crate::options::POINT_CHUNK;
 use crate::reference::nearest::distance;
@@ -39,7 +39,8 @@ impl NearestMemory {
 /// Records the search for the place of the surface that is closest to each point, at most `within` away, in units of the
 /// mesh, and at most 1 / [`crate::layout::Grid::scale`], which is between half of the mesh's largest extent and all of it:
 /// of the faces without neighbour the one with the smallest squared distance (ties: that of the tetrahedron with the lowest
-/// id). Hints and order of the points are not used.
+/// id). Hints are not used. Points that follow each other closely are found faster: give those in no order
+/// [`PointInput::order`].
 ///
 /// Each round tests about a thousand nodes and tetrahedra per point and passes over points that are finished; [`nearest`]
 /// searches for 131,072 points at a time, so that no dispatch takes long. Points close to the surface take one or two rounds,
@@ -68,7 +69,7 @@ fn cmd_nearest_in(
     r: &mut Recorder<'_>,
     scene: &Scene,
     input: &PointInput,
-    (within, cells): (f32, Option<CellRange>),
+    reach: (f32, Option<CellRange>),
     memory: &NearestMemory,
     rounds: Rounds,
 ) -> Result<()> {
@@ -77,38 +78,47 @@ fn cmd_nearest_in(
     let n = u64::from(input.count);
     memory.states.check(size_of::<NearState>() as u64 * n, "states of points")?;
     memory.barycentrics.check(16 * n, "barycentrics")?;
-    record(r, &arguments(scene, input, (within, cells), memory), rounds, NearestSpec::default().budget)
+    record(r, scene, input, reach, memory, rounds, NearestSpec::default().budget)
 }
 
-fn arguments(scene: &Scene, input: &PointInput, (within, cells): (f32, Option<CellRange>), memory: &NearestMemory) -> NearestKernel {
+/// Records the rounds. In each, a point has `budget` nodes and tetrahedra, which must exceed the level of the tree.
+fn record(
+    r: &mut Recorder<'_>,
+    scene: &Scene,
+    input: &PointInput,
+    (within, cell_range): (f32, Option<CellRange>),
+    memory: &NearestMemory,
+    rounds: Rounds,
+    budget: u32,
+) -> Result<()> {
     let (tree, mesh) = (&scene.tree, &scene.mesh);
-    let [first_cell, last_cell] = cells.unwrap_or(CellRange::WHOLE).words();
-    NearestKernel {
+    let PointInput { points, stride, count, .. } = *input;
+    let NearestMemory { states, barycentrics, unfinished } = *memory;
+    let (cells, vertices, neighbours) = (mesh.input.cells, mesh.arrays.vertices, mesh.arrays.neighbours);
+    let [first_cell, last_cell] = cell_range.unwrap_or(CellRange::WHOLE).words();
+    let search = NearestKernel {
         grid: tree.grid,
         masks: tree.masks,
         co: tree.co,
         po: tree.po,
         p: tree.p,
         flags: tree.flags,
-        cells: mesh.input.cells,
-        vertices: mesh.arrays.vertices,
-        neighbours: mesh.arrays.neighbours,
-        points: input.points,
-        states: memory.states,
-        barycentrics: memory.barycentrics,
-        unfinished: memory.unfinished,
-        count: input.count,
-        stride: input.stride,
+        cells,
+        vertices,
+        neighbours,
+        points,
+        states,
+        order: input.order.unwrap_or_else(|| r.gpu().nothing()),
+        unfinished,
+        count,
+        stride,
         // Not a number finds nothing, like a negative distance: drivers may compare it as they like.
         within: if within >= 0.0 { canonical(within) } else { -1.0 },
         first_cell,
         last_cell,
-    }
-}
-
-/// Records the rounds. In each, a point has `budget` nodes and tetrahedra, which must exceed the level of the tree.
-fn record(r: &mut Recorder<'_>, arguments: &NearestKernel, rounds: Rounds, budget: u32) -> Result<()> {
-    let (workgroup, unfinished) = (r.gpu().target().query, arguments.unfinished);
+    };
+    let (workgroup, ordered) = (r.gpu().target().query, u32::from(input.order.is_some()));
+    let groups = Groups::Count(count.div_ceil(workgroup));
     for round in 0..rounds.count {
         if round > 0 {
             r.barrier("nearest → nearest.clear");
@@ -116,10 +126,15 @@ fn record(r: &mut Recorder<'_>, arguments: &NearestKernel, rounds: Rounds, budge
         r.fill(unfinished, 0);
         r.barrier("nearest.clear → nearest");
         let fresh = u32::from(round == 0 && !rounds.resume);
-        let spec = NearestSpec { workgroup, fresh, budget, ..Default::default() };
-        r.stage("query.nearest", |r| r.dispatch(arguments, spec, Groups::Count(arguments.count.div_ceil(workgroup))))?;
+        let spec = NearestSpec { workgroup, fresh, budget, ordered, ..Default::default() };
+        r.stage("query.nearest", |r| r.dispatch(&search, spec, groups))?;
     }
-    Ok(())
+    if rounds.count > 0 {
+        r.barrier("nearest → nearest.places");
+    }
+    let places = NearestPlaces { grid: tree.grid, cells, vertices, neighbours, points, states, barycentrics, count, stride };
+    let spec = NearestPlacesSpec { workgroup, ..Default::default() };
+    r.stage("query.nearest_places", |r| r.dispatch(&places, spec, groups))
 }
 
 /// Closest places of the surface, in host memory.
@@ -159,12 +174,19 @@ pub(crate) fn nearest_in(tree: &Tree, points: &[[f32; 3]], within: f32, cells: O
     let (gpu, scene, scale) = (tree.gpu(), Scene::of(tree), tree.grid().scale);
     let most = points.len().min(AT_ONCE) as u32;
     let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.nearest", |a| NearestMemory::carve(a, most))?;
+    let (_memory, sort) = Arena::reserve(gpu, "olbvh.query.order", |a| PointOrder::carve(gpu, a, most))?;
     let mut all = Nearest { scale, ..Nearest::default() };
     for chunk in points.chunks(AT_ONCE) {
         let asked = gpu.upload("olbvh.query.points", chunk)?;
         let count = chunk.len() as u32;
-        let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
-        let record = |r: &mut Recorder<'_>, rounds| cmd_nearest_in(r, &scene, &input, (within, cells), &memory, rounds);
+        let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: Some(sort.order) };
+        let record = |r: &mut Recorder<'_>, rounds: Rounds| {
+            if !rounds.resume {
+                cmd_sort_points(r, scene.tree.grid, &input, &sort)?;
+                r.barrier("sort_points → nearest");
+            }
+            cmd_nearest_in(r, &scene, &input, (within, cells), &memory, rounds)
+        };
         until_done(gpu, "olbvh.query.nearest", 1, &mut all.times, record, || {
             let unfinished: u32 = gpu.download_one(&buffer, memory.unfinished)?;
             report(all.owners.len() as u64 + u64::from(count - unfinished.min(count)), points.len() as u64)?;
@@ -207,15 +229,17 @@ mod tests {
             let surface = Surface::new(&mesh, &topology, &reference);
             let found = |p| surface.nearest(p, f32::INFINITY).map_or((NONE, f32::INFINITY), |(place, square)| (place.owner, square));
             let expected: Vec<_> = points.iter().map(|&p| found(p)).collect();
-            let input = PointInput { points: input.all(), stride: 3, count: points.len() as u32, hints: None, order: None };
+            let order = gpu.upload("olbvh.test.order", &(0..points.len() as u32).rev().collect::<Vec<_>>()).unwrap();
+            let order = (level == 3).then(|| order.all());
+            let input = PointInput { points: input.all(), stride: 3, count: points.len() as u32, hints: None, order };
             let carve = |a: &mut Arena| NearestMemory::carve(a, input.count);
             let (buffer, memory) = Arena::reserve(&gpu, "olbvh.test.nearest", carve).unwrap();
-            let arguments = arguments(&Scene::of(&tree), &input, (f32::INFINITY, None), &memory);
+            let (scene, reach) = (Scene::of(&tree), (f32::INFINITY, None));
             for budget in [7, 8, 12, 37] {
                 let mut rounds = Rounds::begin(1);
                 let mut count = 0;
                 while count == 0 || gpu.download_one::<u32>(&buffer, memory.unfinished).unwrap() > 0 {
-                    gpu.submit("olbvh.test.nearest", |r| record(r, &arguments, rounds, budget)).unwrap();
+                    gpu.submit("olbvh.test.nearest", |r| record(r, &scene, &input, reach, &memory, rounds, budget)).unwrap();
                     rounds = Rounds::resume(1);
                     count += 1;
                 }

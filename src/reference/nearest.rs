@@ -1,4 +1,4 @@
-//! The place of the surface that is closest to a point. Twin of `glsl/query/nearest`.
+//! The place of the surface that is closest to a point. Twin of `glsl/query/nearest` and `nearest_places`.
 
 use super::assign::{cell_centre, half_cell};
 use super::boundary::Topology;

@@ -156,7 +156,7 @@ fn location() {
         read(r, &[near.states, near.barycentrics, near.unfinished], &sink);
         Ok(())
     });
-    assert_eq!(barriers, 4);
+    assert_eq!(barriers, 5);
     let unordered = submit(&gpu, "olbvh.test.unordered", |r| {
         cmd_locate(r, &scene, &frame.points, &frame.output, &LocateOptions { method: LocateMethod::Sorted, ..LocateOptions::default() })
     });
