@@ -1293,6 +1293,33 @@ enum olbvh_status olbvh_overlap(const struct olbvh_tree *a,
                                 uint32_t *hits_b);
 
 /*
+ Finds every tetrahedron that contains each of `count` points (three floats each); for a point that none contains, its
+ owner within the tolerance, if there is one, alone. `ends` gets for each point where its tetrahedra end in `found`; they
+ are ascending, and start where those of the point before end. `found` has room for `room` of them, and `total` gets the
+ number of all: where that is greater, those that fit are written; call again with more room. Where tetrahedra overlap,
+ only a tree with `lists` 0 finds all.
+ */
+enum olbvh_status olbvh_locate_all(const struct olbvh_tree *tree,
+                                   const float *points,
+                                   size_t count,
+                                   float tolerance,
+                                   uint64_t *ends,
+                                   uint32_t *found,
+                                   size_t room,
+                                   uint64_t *total);
+
+/*
+ Finds all pairs of a tetrahedron of A and one of B that intersect, as `olbvh_overlap` finds the tetrahedra: two numbers
+ for each pair, ascending by A, then by B. `pairs` has room for `room` pairs, and `total` gets the number of all: where
+ that is greater, those that fit are written; call again with more room. The tree over B must have `lists` 0.
+ */
+enum olbvh_status olbvh_overlap_pairs(const struct olbvh_tree *a,
+                                      const struct olbvh_tree *b,
+                                      uint32_t *pairs,
+                                      size_t room,
+                                      uint64_t *total);
+
+/*
  Makes a recording: one per frame in flight, used by one thread at a time.
  */
 enum olbvh_status olbvh_recording_new(const struct olbvh_gpu *gpu, struct olbvh_recording **out);
@@ -1437,7 +1464,8 @@ enum olbvh_status olbvh_nearest_parts(uint32_t count,
 
 /*
  Records the search for the place of the surface that is closest to each point, as `olbvh_nearest` finds it. Of
- `location`, only points, stride and count are used. `unfinished` of `olbvh_nearest_parts` says whether more rounds are
+ `location`, only points, stride and count are used, and memory, if the path is 2 or 3: points in no order are found
+ faster if they are sorted first. `unfinished` of `olbvh_nearest_parts` says whether more rounds are
  needed; until then, a point has no coordinates yet, and its tetrahedron need not be the closest. Points deep inside take
  many rounds: in a grid of 32 x 32 x 32 cubes, 27 for points anywhere, 54 around its middle.
  */

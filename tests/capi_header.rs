@@ -11,7 +11,8 @@ fn the_header_in_the_repository_is_the_generated_one() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     // All in one module, since cbindgen does not follow private ones.
     let mut source = String::new();
-    let files = ["mod", "host", "query", "record", "record/scene", "record/locate", "record/render", "record/slice", "record/overlap"];
+    let files =
+        ["mod", "host", "query", "lists", "record", "record/scene", "record/locate", "record/render", "record/slice", "record/overlap"];
     for file in files.map(|stem| format!("{stem}.rs")) {
         let text = fs::read_to_string(root.join("src/capi").join(file)).unwrap();
         let left_out = ["//!", "#![", "mod ", "#[cfg(test)]"];

@@ -22,6 +22,7 @@
 #![allow(unsafe_code, reason = "the border to C")]
 
 mod host;
+mod lists;
 mod query;
 mod record;
 #[cfg(test)]

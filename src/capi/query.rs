@@ -184,7 +184,7 @@ unsafe fn wanted<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a
 }
 
 /// Writes values to the places that are next, as long as there are any.
-fn fill<T>(places: &mut IterMut<'_, MaybeUninit<T>>, values: impl IntoIterator<Item = T>) {
+pub(super) fn fill<T>(places: &mut IterMut<'_, MaybeUninit<T>>, values: impl IntoIterator<Item = T>) {
     // In this order: the first iterator of a pair may be asked once more than the second.
     for (value, place) in values.into_iter().zip(places) {
         place.write(value);

@@ -11,6 +11,7 @@ macro_rules! call {
     }};
 }
 
+mod owned;
 mod pictures;
 mod plans;
 mod queries;
@@ -300,7 +301,7 @@ fn a_c_host_records_by_address_and_asks() {
     };
     let gpu = made(|out| call!(olbvh_gpu_from_host(&raw const lent, out)));
     frames(gpu);
-    queries::owned(gpu);
+    owned::owned(gpu);
     call!(olbvh_gpu_free(gpu));
     // Without a queue, only recording is possible; here with the host's pipeline cache.
     // SAFETY: the create info is complete, and the cache is destroyed below, when nothing uses it any more.

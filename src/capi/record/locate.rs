@@ -4,9 +4,10 @@ use super::scene::{OlbvhScene, begun_with};
 use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds};
 use crate::capi::{OlbvhStatus, border, handle, place, tolerance};
 use crate::error::{Error, Result};
+use crate::gpu::Recorder;
 use crate::query::{
-    LocateMethod, LocateOptions, LocateOutput, NearestMemory, OwnersMemory, PointInput, PointOrder, cmd_count_owners, cmd_interpolate,
-    cmd_list_owners, cmd_locate, cmd_nearest, cmd_sort_points,
+    LocateMethod, LocateOptions, LocateOutput, NearestMemory, OwnersMemory, PointInput, PointOrder, Rounds, cmd_count_owners,
+    cmd_interpolate, cmd_list_owners, cmd_locate, cmd_nearest, cmd_sort_points,
 };
 
 /// Points to locate, and where the results go.
@@ -111,6 +112,21 @@ impl OlbvhLocation {
         PointInput { points: self.points.part(), stride: self.stride, count: self.count, hints: self.hints.given(), order: None }
     }
 
+    /// The points in the order that paths which sort take them; records the sort and a barrier behind it, unless it has been
+    /// done before (`resume`).
+    fn in_order(&self, r: &mut Recorder<'_>, OlbvhScene { gpu, scene, .. }: &OlbvhScene, resume: bool) -> Result<PointInput> {
+        let input = self.input();
+        if !self.options()?.method.is_sorted() {
+            return Ok(input);
+        }
+        let order = self.memory.place(|a| PointOrder::carve(gpu, a, self.count))?;
+        if !resume {
+            cmd_sort_points(r, scene.tree.grid, &input, &order)?;
+            r.barrier("sort_points → points");
+        }
+        Ok(PointInput { order: Some(order.order), ..input })
+    }
+
     fn output(&self) -> LocateOutput {
         LocateOutput { owners: self.owners.part(), barycentrics: self.barycentrics.part() }
     }
@@ -142,16 +158,9 @@ pub unsafe extern "C" fn olbvh_cmd_locate(
 ) -> OlbvhStatus {
     border(|| {
         // SAFETY: the caller keeps the rules of `capi`.
-        let ((r, OlbvhScene { gpu, scene, .. }), location) =
-            unsafe { (begun_with(recording, scene, "scene")?, handle(location, "location")?) };
-        let (options, mut input) = (location.options()?, location.input());
-        if options.method.is_sorted() {
-            let order = location.memory.place(|a| PointOrder::carve(gpu, a, location.count))?;
-            cmd_sort_points(r, scene.tree.grid, &input, &order)?;
-            r.barrier("sort_points → locate");
-            input.order = Some(order.order);
-        }
-        cmd_locate(r, scene, &input, &location.output(), &options)
+        let ((r, scene), location) = unsafe { (begun_with(recording, scene, "scene")?, handle(location, "location")?) };
+        let input = location.in_order(r, scene, false)?;
+        cmd_locate(r, &scene.scene, &input, &location.output(), &location.options()?)
     })
 }
 
@@ -215,7 +224,8 @@ pub unsafe extern "C" fn olbvh_nearest_parts(count: u32, memory: OlbvhBuffer, ou
 }
 
 /// Records the search for the place of the surface that is closest to each point, as `olbvh_nearest` finds it. Of
-/// `location`, only points, stride and count are used. `unfinished` of `olbvh_nearest_parts` says whether more rounds are
+/// `location`, only points, stride and count are used, and memory, if the path is 2 or 3: points in no order are found
+/// faster if they are sorted first. `unfinished` of `olbvh_nearest_parts` says whether more rounds are
 /// needed; until then, a point has no coordinates yet, and its tetrahedron need not be the closest. Points deep inside take
 /// many rounds: in a grid of 32 x 32 x 32 cubes, 27 for points anywhere, 54 around its middle.
 #[unsafe(no_mangle)]
@@ -229,10 +239,11 @@ pub unsafe extern "C" fn olbvh_cmd_nearest(
 ) -> OlbvhStatus {
     border(|| {
         // SAFETY: the caller keeps the rules of `capi`.
-        let ((r, OlbvhScene { scene, .. }), location) = unsafe { (begun_with(recording, scene, "scene")?, handle(location, "location")?) };
-        let input = OlbvhLocation { hints: OlbvhBuffer::default(), ..*location }.input();
+        let ((r, scene), location) = unsafe { (begun_with(recording, scene, "scene")?, handle(location, "location")?) };
+        let rounds = Rounds::from(rounds);
+        let input = OlbvhLocation { hints: OlbvhBuffer::default(), ..*location }.in_order(r, scene, rounds.resume)?;
         let memory = memory.place(|a| NearestMemory::carve(a, location.count))?;
-        cmd_nearest(r, scene, &input, within, &memory, rounds.into())
+        cmd_nearest(r, &scene.scene, &input, within, &memory, rounds)
     })
 }
 

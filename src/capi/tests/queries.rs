@@ -1,14 +1,13 @@
-//! Tests of every query, recorded and owning, as a C program calls it: the results are the same bytes as from Rust.
+//! Tests of every recorded query, as a C program calls it: the results are the same bytes as from Rust.
 
-use super::pictures::pictures;
 use super::*;
 use crate::capi::query::*;
 use crate::gpu::Buffer;
 use crate::layout::{NearState, OverlapStatus, RenderStatus, SliceStatus, ViewUniforms, wide};
-use crate::mesh::{Bounds, Field};
+use crate::mesh::Bounds;
 use crate::options::TOLERANCE;
 use crate::query::{LocateOptions, Nearest, SILENT, locate, locate_all, nearest, overlap, overlap_pairs, render, slice};
-use crate::render::{PicturePlan, Prepared, ProjectedView, ValidTets};
+use crate::render::{PicturePlan, ProjectedView};
 use crate::slicing::{Band, Extrapolate};
 use bytemuck::Pod;
 use glam::DMat4;
@@ -22,7 +21,7 @@ pub fn settings() -> OlbvhPictureSettings {
     OlbvhPictureSettings { width: 37, height: 30, colors, opacity, range: [-1.5, 5.0], ..olbvh_default_picture_settings() }
 }
 
-fn voxels() -> OlbvhVoxels {
+pub fn voxels() -> OlbvhVoxels {
     let axis = |c: usize, x: f32| [0, 1, 2].map(|k| if k == c { x } else { 0.0 });
     let half = [axis(0, 0.2), axis(1, 0.2), axis(2, 0.4)];
     OlbvhVoxels {
@@ -37,30 +36,30 @@ fn voxels() -> OlbvhVoxels {
     }
 }
 
-fn meshes() -> [Mesh; 2] {
+pub fn meshes() -> [Mesh; 2] {
     let mut other = kuhn_jittered([3; 3], 0.3, 9).unwrap();
     other.points.iter_mut().for_each(|p| *p = p.map(|x| x + 1.3));
     [kuhn_jittered([5, 4, 3], 0.3, 1).unwrap(), other]
 }
 
-fn values(mesh: &Mesh) -> Vec<f32> {
+pub fn values(mesh: &Mesh) -> Vec<f32> {
     mesh.points.iter().map(|p| p[0] - 0.5 * p[2]).collect()
 }
 
 /// Results of the Rust interface.
-struct Expected {
-    colors: Vec<[f32; 4]>,
-    answers: Vec<u32>,
-    sliced: Vec<u32>,
-    hits: [Vec<u32>; 2],
-    pairs: Vec<[u32; 2]>,
-    owners: Vec<Vec<u32>>,
-    located: Vec<f32>,
-    nearest: Nearest,
+pub struct Expected {
+    pub colors: Vec<[f32; 4]>,
+    pub answers: Vec<u32>,
+    pub sliced: Vec<u32>,
+    pub hits: [Vec<u32>; 2],
+    pub pairs: Vec<[u32; 2]>,
+    pub owners: Vec<Vec<u32>>,
+    pub located: Vec<f32>,
+    pub nearest: Nearest,
 }
 
 /// Answers, bits of the values, and the number of bands of a stack.
-fn sliced(tree: &Tree, field: Option<(&[f32], On)>, voxels: &OlbvhVoxels) -> (Vec<u32>, Vec<u32>, u32) {
+pub fn sliced(tree: &Tree, field: Option<(&[f32], On)>, voxels: &OlbvhVoxels) -> (Vec<u32>, Vec<u32>, u32) {
     let (mut answers, mut values, mut bands) = (Vec::new(), Vec::new(), 0);
     let mut sink = |band: Band| {
         let answer = |(&owner, &kind): (&u32, &u8)| if kind == crate::slicing::TOUCHED { owner | 1 << 31 } else { owner };
@@ -73,7 +72,7 @@ fn sliced(tree: &Tree, field: Option<(&[f32], On)>, voxels: &OlbvhVoxels) -> (Ve
     (answers, values, bands)
 }
 
-fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &PicturePlan, normals: Option<&[[f32; 3]]>) -> Expected {
+pub fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &PicturePlan, normals: Option<&[[f32; 3]]>) -> Expected {
     let values = values(&meshes[0]);
     let field = Some((&values[..], On::Points));
     let [mesh, other] = meshes.each_ref().map(|m| DeviceMesh::upload(gpu, m, BadCells::Skip).unwrap());
@@ -344,125 +343,4 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     call!(olbvh_recording_free(recording));
     call!(olbvh_scene_free(a.scene));
     call!(olbvh_scene_free(b.scene));
-}
-
-/// A stack that is sliced in several bands.
-fn large_stack(tree: *mut OlbvhTree, values: &[f32]) {
-    let stack =
-        OlbvhVoxels { next_voxel: [0.007, 0.0, 0.0], next_row: [0.0, 0.004, 0.0], width: 1000, height: 1400, layers: 2, ..voxels() };
-    let held = call!(handle(tree, "tree")).unwrap();
-    let expected = sliced(&held.tree, Some((values, On::Points)), &stack);
-    let (mut answers, mut found) = (vec![0u32; 2_800_000], vec![0f32; 2_800_000]);
-    ok(call!(olbvh_slice(tree, &raw const stack, values.as_ptr(), 0, 1, answers.as_mut_ptr(), found.as_mut_ptr())));
-    assert!(expected.2 > 2 && expected.0 == answers, "{} bands", expected.2);
-    assert!(found.iter().map(|v| v.to_bits()).eq(expected.1), "values");
-}
-
-/// Compares the owning calls with the Rust interface. With a reordered mesh the results are mapped back to the caller's
-/// numbers and differ only in the owners of shared faces, edges and vertices.
-pub fn owned(gpu: *mut OlbvhGpu) {
-    let device = &call!(handle(gpu, "gpu")).unwrap().0;
-    let [mesh, other] = meshes();
-    let settings = OlbvhPictureSettings { shading: 0, ..settings() };
-    let prepare = |tree: &OlbvhTree, settings: &OlbvhPictureSettings| {
-        let bounds = Bounds::from(tree.tree.grid());
-        let (neighbours, field) =
-            (tree.mesh.device.neighbours().unwrap(), Field { name: String::new(), on: On::Points, values: values(&mesh) });
-        let valid = ValidTets { bounds, neighbours: &neighbours, is_valid: &|_| true };
-        Prepared::new(&call!(settings.read()).unwrap(), &mesh, &valid, &field).unwrap()
-    };
-    let tree_of = |mesh: &Mesh, reorder: u32| -> *mut OlbvhTree {
-        // At twice the size, and then moved to where it belongs.
-        let double: Vec<[f32; 3]> = mesh.points.iter().map(|p| p.map(|x| 2.0 * x)).collect();
-        let (points, tets) = (double.as_ptr().cast(), mesh.tets.as_ptr().cast());
-        let first: *mut OlbvhMesh =
-            made(|out| call!(olbvh_mesh_upload(gpu, points, mesh.points.len(), tets, mesh.tets.len(), reorder, out)));
-        let held: *mut OlbvhMesh = made(|out| call!(olbvh_mesh_moved(first, mesh.points.as_ptr().cast(), out)));
-        call!(olbvh_mesh_free(first));
-        let tree = made(|out| call!(olbvh_tree_build(held, null(), out)));
-        for level in [1, 4] {
-            let options = OlbvhBuildOptions { level, ..olbvh_default_build_options() };
-            let other: *mut OlbvhTree = made(|out| call!(olbvh_tree_build(held, &raw const options, out)));
-            let info: OlbvhTreeInfo = made(|out| call!(olbvh_tree_info(other, out)));
-            assert_eq!(info.level, level);
-            call!(olbvh_tree_free(other));
-        }
-        call!(olbvh_mesh_free(held));
-        tree
-    };
-    let middle = |t: &[u32; 4]| [0, 1, 2].map(|c| t.iter().map(|&v| mesh.points[v as usize][c] / 4.0).sum::<f32>());
-    let middles: Vec<[f32; 3]> = mesh.tets.iter().map(middle).collect();
-    let other_tree = tree_of(&other, 1);
-    let voxels = voxels();
-    let mut first = None;
-    for reorder in [0, 1] {
-        let tree = tree_of(&mesh, reorder);
-        let expected = first.get_or_insert_with(|| {
-            let Prepared { plan, .. } = prepare(call!(handle(tree, "tree")).unwrap(), &settings);
-            expected(device, &[mesh.clone(), other.clone()], &plan, None)
-        });
-        let mut owners = vec![0; middles.len()];
-        ok(call!(olbvh_locate(tree, middles.as_ptr().cast(), middles.len(), -1.0, owners.as_mut_ptr(), null_mut())));
-        assert!((0..).zip(&owners).all(|(tet, &owner)| tet == owner));
-        sampled(tree, &mesh, &middles);
-        let (count, wanted) = (mesh.points.len(), &expected.nearest);
-        let (mut owners, mut places, mut distances) = (vec![0; count], vec![[0f32; 4]; count], vec![0f32; count]);
-        let [to_places, to_distances] = [places.as_mut_ptr().cast(), distances.as_mut_ptr()];
-        ok(call!(olbvh_nearest(tree, mesh.points.as_ptr().cast(), count, 1.0, owners.as_mut_ptr(), to_places, to_distances)));
-        // In another order, equally near places are found in other tetrahedra.
-        assert!(owners == wanted.owners && places == wanted.barycentrics || reorder == 1);
-        assert!(distances.iter().zip(wanted.distances()).all(|(a, b)| (a - b).abs() < 1e-5 || a.is_nan() && b.is_nan()));
-        let values = values(&mesh);
-        let mut colors = vec![[0f32; 4]; 37 * 30];
-        ok(call!(olbvh_render(tree, &raw const settings, values.as_ptr(), 0, colors.as_mut_ptr().cast())));
-        let (mut answers, mut sliced) = (vec![0u32; 17 * 13 * 6], vec![0f32; 17 * 13 * 6]);
-        ok(call!(olbvh_slice(tree, &raw const voxels, values.as_ptr(), 0, 1, answers.as_mut_ptr(), sliced.as_mut_ptr())));
-        let mut hits = expected.hits.clone().map(|words| vec![u32::MAX; words.len()]);
-        let [of_mesh, of_other] = &mut hits;
-        ok(call!(olbvh_overlap(tree, other_tree, of_mesh.as_mut_ptr(), of_other.as_mut_ptr())));
-        assert!(hits == expected.hits, "reorder {reorder}");
-        let kinds = |answers: &[u32]| answers.iter().map(|&a| if a == u32::MAX { 2 } else { a >> 31 }).collect::<Vec<_>>();
-        assert_eq!(kinds(&answers), kinds(&expected.answers), "reorder {reorder}");
-        let same = answers.iter().zip(&expected.answers).filter(|(a, b)| a == b).count();
-        assert!(same == answers.len() || reorder == 1 && same > answers.len() * 9 / 10, "{same} of {}", answers.len());
-        assert!(colors == expected.colors || reorder == 1, "colours");
-        assert!(sliced.iter().map(|v| v.to_bits()).eq(expected.sliced.iter().copied()) || reorder == 1, "values");
-        let near = |a: &f32, b: u32| (a - f32::from_bits(b)).abs() < 1e-3 || a.is_nan();
-        assert!(sliced.iter().zip(&expected.sliced).filter(|(a, b)| near(a, **b)).count() > answers.len() * 9 / 10);
-        if reorder == 0 {
-            large_stack(tree, &values);
-            let fresh = tree_of(&mesh, 0);
-            pictures(fresh, &values, &|settings| prepare(call!(handle(fresh, "tree")).unwrap(), settings));
-            call!(olbvh_tree_free(fresh));
-        }
-        call!(olbvh_tree_free(tree));
-    }
-    let mut none = OlbvhPictureSettings { iso_count: 9, ..settings };
-    assert_eq!(call!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut())), OlbvhStatus::Invalid);
-    assert!(message().contains("9 iso-surfaces"), "{}", message());
-    none = OlbvhPictureSettings { camera: c"nowhere".as_ptr(), ..settings };
-    assert_eq!(call!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut())), OlbvhStatus::Invalid);
-    assert!(message().contains("nowhere"), "{}", message());
-    call!(olbvh_tree_free(other_tree));
-}
-
-/// Samples three components at the middles of all tetrahedra, and outside: numbers of the tetrahedra, and the coordinates.
-fn sampled(tree: *mut OlbvhTree, mesh: &Mesh, middles: &[[f32; 3]]) {
-    let mut points = middles.to_vec();
-    points.push([1e6; 3]);
-    let numbers: Vec<[f32; 2]> = (0..mesh.tets.len()).map(|t| [t as f32, -(t as f32)]).collect();
-    let sample = |values: *const f32, components, on_cells, results: *mut f32| {
-        call!(olbvh_sample(tree, points.as_ptr().cast(), points.len(), -1.0, values, components, on_cells, results))
-    };
-    let mut of_cells = vec![[0f32; 2]; points.len()];
-    ok(sample(numbers.as_ptr().cast(), 2, 1, of_cells.as_mut_ptr().cast()));
-    assert_eq!(of_cells[..middles.len()], numbers[..]);
-    let mut places = vec![[0f32; 3]; points.len()];
-    ok(sample(mesh.points.as_ptr().cast(), 3, 0, places.as_mut_ptr().cast()));
-    assert!(places.iter().zip(middles).all(|(a, b)| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4)));
-    assert!(of_cells[middles.len()].iter().chain(&places[middles.len()]).all(|v| v.is_nan()));
-    for (components, what) in [(3, "values"), (0, "components")] {
-        assert_eq!(sample(null(), components, 0, places.as_mut_ptr().cast()), OlbvhStatus::Invalid);
-        assert!(message().contains(what), "{}", message());
-    }
 }
