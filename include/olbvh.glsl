@@ -163,9 +163,6 @@ uvec3 olbvh_quantize(olbvh_Grid g, vec3 x) {
     return olbvh_cell_at(olbvh_in_cells(g, olbvh_from_corner(g, x)));
 }
 
-// Words of one bit for each cell of a level.
-uint olbvh_cell_words(uint level) { return ((1u << 3u * level) + 31u) / 32u; }
-
 // Packs a cell of the finest grid into one word, and unpacks it.
 uint olbvh_pack_cell(uvec3 q) { return q.x | q.y << 10 | q.z << 20; }
 uvec3 olbvh_unpack_cell(uint word) { return uvec3(word, word >> 10, word >> 20) & 1023u; }

@@ -40,9 +40,7 @@ fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
     let in_shape = |case: &Case| (binding == Binding::Address && driver.starts_with("lavapipe25-")) || !case.name.contains("/row-");
     // Surfaces are drawn from the same buffers as volumes.
     let same = |case: &Case| binding == Binding::Descriptors && case.name.contains("/surfaces");
-    // Trees over one place are as deep as trees get, and SwiftShader takes 8 s to clear the marks of so many cells.
-    let slow = |case: &Case| driver == "swiftshader" && case.family() == "one-place";
-    let in_brief = |case: &Case| BRIEF.contains(&case.family()) && in_shape(case) && !same(case) && !slow(case);
+    let in_brief = |case: &Case| BRIEF.contains(&case.family()) && in_shape(case) && !same(case);
     let mut families = grouped(group, |case| reference || !case.is_over_a_mesh() || in_brief(case));
     if reference {
         let short = |(name, cases): &mut (String, Vec<Case>)| cases.iter().any(Case::is_over_a_mesh) && !LONG.contains(&name.as_str());

@@ -4,6 +4,7 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
+#include "shared/clearing.glsl"
 layout(constant_id = 2) const uint EACH = 64; // items per workgroup of that dispatch
 ARGUMENTS(6)
     uint tets;
@@ -87,5 +88,5 @@ void main() {
     bool single = in_shares != 0u && (status.at[0].large_levels >> level & 1u) == 0u;
     uint counts = single ? 1u : tets + 1u;
     live.at[0] = counts;
-    write_groups(0u, max(counts, marked == 0u ? 0u : cell_words(level)), EACH);
+    write_groups(0u, max(counts, marked == 0u ? 0u : clearing_items(level)), EACH);
 }

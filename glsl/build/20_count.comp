@@ -7,6 +7,7 @@
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/share.glsl"
+#include "shared/clearing.glsl"
 layout(constant_id = 2) const uint IN_SHARES = 0;
 layout(constant_id = 3) const uint CLEAR = 0;
 ARGUMENTS(7)

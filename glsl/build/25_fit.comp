@@ -5,6 +5,7 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
+#include "shared/clearing.glsl"
 layout(constant_id = 2) const uint EACH = 64; // items per workgroup of those dispatches
 ARGUMENTS(8)
     uint tets;
@@ -45,8 +46,8 @@ void main() {
     }
     uint n = again ? tets : 0u;
     live.at[0] = again ? tets + 1u : 0u;
-    // Marks are cleared by the same dispatch, a word per invocation.
-    write_groups(0u, again ? max(tets + 1u, cell_words(level)) : 0u, EACH);
+    // Marks are cleared by the same dispatch.
+    write_groups(0u, again ? max(tets + 1u, clearing_items(level)) : 0u, EACH);
     write_groups(1u, (n + 31u) / 32u, EACH);
     write_groups(2u, n, EACH);
 }

@@ -68,9 +68,6 @@ uvec3 quantize(Grid g, vec3 x) {
     return cell_at(in_cells(g, from_corner(g, x)));
 }
 
-// Words of one bit for each cell of a level.
-uint cell_words(uint level) { return ((1u << 3u * level) + 31u) / 32u; }
-
 // Packs a cell of the finest grid into one word, and unpacks it.
 uint pack_cell(uvec3 q) { return q.x | q.y << 10 | q.z << 20; }
 uvec3 unpack_cell(uint word) { return uvec3(word, word >> 10, word >> 20) & 1023u; }
